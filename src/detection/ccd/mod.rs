@@ -1,0 +1,1 @@
+//! Continuous collision detection of one pair moving on straight lines.

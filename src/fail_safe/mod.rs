@@ -1,0 +1,1 @@
+//! What is done when the iterations of a method do not reach a clean state: rigid zones, hold.

@@ -1,0 +1,1 @@
+//! Triangle meshes, shapes and their validation.

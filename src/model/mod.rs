@@ -1,0 +1,22 @@
+//! The constant model, the state that a step changes, settings and reports.
+//!
+//! * `body`: what a body is, who drives it, what it collides with
+//! * `material`: friction with its combine rule
+//! * `system`: block pattern of a host matrix over one or more bodies
+//! * `state`: positions and poses; what the host drives
+//! * `settings`: tolerances and work caps
+//! * `report`: what a step did, and how it can fail
+
+mod body;
+mod material;
+mod report;
+mod settings;
+mod state;
+mod system;
+
+pub use body::{BlockRange, Body, BodyDescription, Kind, Model, Precision, Surface};
+pub use material::{CombineRule, Material, Materials};
+pub use report::{BuildError, ContactRecord, StageTimes, StepError, StepReport, Witness};
+pub use settings::{FrictionCone, Settings, SolverChoice, StartPolicy};
+pub use state::{Drives, HalfSpace, State, StepResult};
+pub use system::{System, SystemDescription};

@@ -1,0 +1,88 @@
+//! Tolerances and work caps of a step. All relative or counters: never wall-clock, never absolute lengths.
+
+/// Which solver runs the constrained dynamics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SolverChoice {
+    /// Accelerated projected relaxation with a short splitting start and the augmented Lagrangian as fallback.
+    #[default]
+    Automatic,
+    /// Iterative constraint anticipation exactly as published [Otaduy09, §5.5].
+    IterativeAnticipation,
+    /// The same with one light pass over the contacts per outer iteration.
+    LightAnticipation,
+    /// Accelerated projected relaxation alone.
+    AcceleratedRelaxation,
+    /// Augmented Lagrangian with preconditioned conjugate gradients.
+    AugmentedLagrangian,
+    /// Full constraint anticipation [Otaduy09, §5.1]; a baseline, quadratic cost.
+    FullAnticipation,
+}
+
+/// Shape of the friction limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FrictionCone {
+    /// `|gamma| <= mu lambda`, isotropic.
+    #[default]
+    Disc,
+    /// Each component clamped on its own, aligned with the unconstrained sliding velocity [Otaduy09, §3.4]; up to
+    /// `sqrt 2 mu` along the diagonal.
+    Pyramid,
+}
+
+/// What to do with a start state that intersects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartPolicy {
+    /// Refuse it, with witnesses.
+    #[default]
+    Refuse,
+    /// Let every pair that touches the tangled component pass until it has separated.
+    Pass,
+}
+
+/// Settings of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Solver of the constrained dynamics.
+    pub solver: SolverChoice,
+    /// Shape of the friction limit.
+    pub friction_cone: FrictionCone,
+    /// Start states that intersect, and scripted motions that leave no room.
+    pub start_policy: StartPolicy,
+    /// Bound of the complementarity and friction residuals, relative to the largest velocity.
+    pub contact_tolerance: f64,
+    /// Bound of the estimated relative velocity error.
+    pub velocity_tolerance: f64,
+    /// Outer iterations of one constrained dynamics solve at most.
+    pub iterations_max: u32,
+    /// Rounds of constraint manifold refinement before a step is divided [Otaduy09, §4: 5].
+    pub rounds_max: u32,
+    /// Halvings of a step before the fail-safes [Otaduy09, §4: 2].
+    pub halvings_max: u32,
+    /// Thickness regained per step at most, as a fraction of the pair thickness.
+    pub recovery_fraction: f64,
+    /// Proximity range at the start of a step, as a multiple of the pair thickness.
+    pub proximity_factor: f64,
+    /// A rigid or kinematic part that turns more than this in a step is subdivided in time `[rad]`.
+    pub turn_max: f64,
+    /// Certify the end state by exact predicates.
+    pub certify: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            solver: SolverChoice::default(),
+            friction_cone: FrictionCone::default(),
+            start_policy: StartPolicy::default(),
+            contact_tolerance: 1e-3,
+            velocity_tolerance: 1e-2,
+            iterations_max: 2000,
+            rounds_max: 5,
+            halvings_max: 2,
+            recovery_fraction: 0.1,
+            proximity_factor: 1.0,
+            turn_max: 0.5,
+            certify: false,
+        }
+    }
+}

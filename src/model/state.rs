@@ -1,0 +1,53 @@
+//! What a step changes, and what the host drives it with.
+
+use super::System;
+use crate::kinematics::Pose;
+use crate::math::Vec3;
+
+/// An analytic half-space: points with `normal · x >= offset` are free.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfSpace {
+    /// Unit normal, towards the free side.
+    pub normal: Vec3,
+    /// Distance of the plane from the origin along the normal `[m]`.
+    pub offset: f64,
+}
+
+/// State at the start of a step; [`crate::implicit_contact::advance`] leaves the end state in it.
+#[derive(Clone, Debug, Default)]
+pub struct State {
+    /// Position of every collision vertex `[m]`. For rigid bodies derived from the pose.
+    pub positions: Vec<Vec3>,
+    /// Pose per body; the identity for bodies without one.
+    pub poses: Vec<Pose>,
+    /// Half-space per body; meaningless for other bodies.
+    pub half_spaces: Vec<HalfSpace>,
+}
+
+/// What the host asks for in a step: unconstrained velocities and scripted targets.
+#[derive(Clone, Debug, Default)]
+pub struct Drives {
+    /// Displacement velocity `v* = (x* - x0)/dt` per block `[m/s]`; angular blocks `[rad/s]`, world frame.
+    pub velocities: Vec<Vec3>,
+    /// End position per vertex; read for kinematic bodies that are not posed.
+    pub target_positions: Vec<Vec3>,
+    /// End pose per body; read for posed kinematic bodies.
+    pub target_poses: Vec<Pose>,
+    /// End half-space per body.
+    pub target_half_spaces: Vec<HalfSpace>,
+    /// Host matrices of this step.
+    pub systems: Vec<System>,
+}
+
+/// What a step gives back besides the end state.
+#[derive(Clone, Debug, Default)]
+pub struct StepResult {
+    /// `(x1 - x0)/dt` per block, the mean over the parts of a divided step.
+    pub velocities: Vec<Vec3>,
+    /// Velocity of the last part per block, for the next step's dynamics.
+    pub end_velocities: Vec<Vec3>,
+    /// Contact impulse over the whole step per block `[N s]`; angular blocks `[N m s]` about the centre of mass.
+    pub impulses: Vec<Vec3>,
+    /// Contacts of the last part, in stable order.
+    pub contacts: Vec<super::ContactRecord>,
+}

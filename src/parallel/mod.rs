@@ -1,0 +1,139 @@
+//! Drivers that map kernels over indices: serial, or on a private pool.
+//!
+//! Work is split by data in blocks of fixed size and sums run over blocks in index order, so every number of threads
+//! gives the same bits. The only module that names rayon.
+
+use rayon::prelude::*;
+
+/// Items per block of [`Par::for_each_block`] and [`Par::sum`]. Part of the numbers: changing it changes sums.
+pub const BLOCK: usize = 1024;
+
+/// Where work runs. Copied freely; holds no state of its own.
+#[derive(Clone, Copy)]
+pub enum Par<'a> {
+    /// On the calling thread; spawns nothing.
+    Serial,
+    /// On a private pool.
+    Pool(&'a Pool),
+}
+
+/// A private thread pool, joined when dropped.
+pub struct Pool {
+    pool: Option<rayon::ThreadPool>,
+    handles: std::sync::Arc<std::sync::Mutex<Vec<std::thread::JoinHandle<()>>>>,
+}
+
+impl Pool {
+    /// A pool of `threads` workers (at least one). Errors: the operating system's message when a thread cannot start.
+    pub fn new(threads: usize) -> Result<Pool, String> {
+        let handles = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
+        let kept = handles.clone();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.max(1))
+            .spawn_handler(move |worker| {
+                let handle = std::thread::Builder::new().spawn(|| worker.run())?;
+                if let Ok(mut list) = kept.lock() {
+                    list.push(handle);
+                }
+                Ok(())
+            })
+            .build()
+            .map_err(|error| error.to_string())?;
+        Ok(Pool { pool: Some(pool), handles })
+    }
+
+    /// Number of workers.
+    pub fn threads(&self) -> usize {
+        self.pool.as_ref().map_or(1, |pool| pool.current_num_threads())
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        drop(self.pool.take());
+        if let Ok(mut list) = self.handles.lock() {
+            for handle in list.drain(..) {
+                // A worker that panicked has been reported by the task that panicked.
+                let _ = handle.join();
+            }
+        }
+    }
+}
+
+impl Par<'_> {
+    fn pool(&self) -> Option<&rayon::ThreadPool> {
+        match self {
+            Par::Serial => None,
+            Par::Pool(pool) => pool.pool.as_ref(),
+        }
+    }
+
+    /// `out[i] = f(i)` for every index.
+    pub fn map_into<T: Send>(&self, out: &mut [T], f: impl Fn(usize) -> T + Sync) {
+        self.for_each_block(out, |start, block| {
+            for (i, item) in block.iter_mut().enumerate() {
+                *item = f(start + i);
+            }
+        });
+    }
+
+    /// The vector of `f(i)` for `i` in `0..count`.
+    pub fn map_indexed<T: Send>(&self, count: usize, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        match self.pool() {
+            Some(pool) if count > BLOCK => {
+                pool.install(|| (0..count).into_par_iter().with_min_len(BLOCK).map(&f).collect())
+            }
+            _ => (0..count).map(f).collect(),
+        }
+    }
+
+    /// Calls `f(start, block)` for disjoint blocks of [`BLOCK`] items of `data`.
+    pub fn for_each_block<T: Send>(&self, data: &mut [T], f: impl Fn(usize, &mut [T]) + Sync) {
+        match self.pool() {
+            Some(pool) if data.len() > BLOCK => pool.install(|| {
+                data.par_chunks_mut(BLOCK).enumerate().for_each(|(i, block)| f(i * BLOCK, block));
+            }),
+            _ => data.chunks_mut(BLOCK).enumerate().for_each(|(i, block)| f(i * BLOCK, block)),
+        }
+    }
+
+    /// Calls `f` for every item, items being tasks of unequal size (one body, one tree branch).
+    pub fn for_each_task<T: Send>(&self, tasks: &mut [T], f: impl Fn(&mut T) + Sync) {
+        match self.pool() {
+            Some(pool) if tasks.len() > 1 => pool.install(|| tasks.par_iter_mut().with_max_len(1).for_each(&f)),
+            _ => tasks.iter_mut().for_each(f),
+        }
+    }
+
+    /// `sum f(i)` for `i` in `0..count`, summed within blocks of [`BLOCK`] and then over blocks in index order.
+    pub fn sum(&self, count: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
+        let blocks = count.div_ceil(BLOCK);
+        let partial = |b: usize| (b * BLOCK..count.min((b + 1) * BLOCK)).fold(0.0, |s, i| s + f(i));
+        match self.pool() {
+            Some(pool) if blocks > 1 => {
+                let partials: Vec<f64> = pool.install(|| (0..blocks).into_par_iter().map(partial).collect());
+                partials.into_iter().fold(0.0, |s, p| s + p)
+            }
+            _ => (0..blocks).map(partial).fold(0.0, |s, p| s + p),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_have_the_same_bits_on_any_number_of_threads() {
+        let f = |i: usize| 1.0 / (1.0 + i as f64);
+        let serial = Par::Serial.sum(100_003, f);
+        for threads in [1, 2, 5] {
+            let pool = Pool::new(threads).map_err(|e| panic!("{e}"));
+            if let Ok(pool) = pool {
+                assert_eq!(serial.to_bits(), Par::Pool(&pool).sum(100_003, f).to_bits());
+                let squares = Par::Pool(&pool).map_indexed(5000, |i| i * i);
+                assert!(squares.iter().enumerate().all(|(i, s)| *s == i * i));
+            }
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Bodies by id, the step, queries.
