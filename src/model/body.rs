@@ -129,6 +129,7 @@ impl Model {
         systems: Vec<SystemDescription>,
     ) -> Result<Model, BuildError> {
         bodies.sort_by_key(|body| body.key);
+        super::validate::check(&bodies, &materials, &systems)?;
         let mut model = Model { materials, systems, ..Model::default() };
         for description in bodies {
             let first = model.rest.len();

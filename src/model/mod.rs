@@ -4,18 +4,23 @@
 //! * `material`: friction with its combine rule
 //! * `system`: block pattern of a host matrix over one or more bodies
 //! * `state`: positions and poses; what the host drives
+//! * `motion`: from velocities to end states
 //! * `settings`: tolerances and work caps
+//! * `validate`: checks of descriptions
 //! * `report`: what a step did, and how it can fail
 
 mod body;
 mod material;
+mod motion;
 mod report;
 mod settings;
 mod state;
 mod system;
+mod validate;
 
 pub use body::{BlockRange, Body, BodyDescription, Kind, Model, Precision, Surface};
 pub use material::{CombineRule, Material, Materials};
+pub use motion::Segment;
 pub use report::{BuildError, ContactRecord, StageTimes, StepError, StepReport, Witness};
 pub use settings::{FrictionCone, Settings, SolverChoice, StartPolicy};
 pub use state::{Drives, HalfSpace, State, StepResult};
