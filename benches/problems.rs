@@ -1,0 +1,70 @@
+//! Writes contact problems from recorded cloth states.
+//!
+//! `cargo bench --bench problems -- STATE OUT [sphere] [young=1000] [dt=0.004]`: STATE holds, little-endian, the `u64`
+//! number of vertices of a square 1 m cloth, its positions and its velocities as `f64`. The problem lists every pair
+//! nearer than 4 mm, thickness 2 mm, friction 0.3, the ground z = 0 and, on request, the sphere of the comparison scenes.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+#[allow(dead_code, unused_imports)]
+mod support;
+
+use signorini::math::Vec3;
+use support::deformable::{CLOTH, Deformable, Sheet};
+use support::nearby::{Surfaces, pairs};
+use support::problem::{Problem, RowChoice, half_space_pairs};
+use support::shapes::{cloth_grid, edges_of, sphere};
+
+fn read_state(path: &str) -> (Vec<Vec3>, Vec<Vec3>) {
+    let bytes = std::fs::read(path).expect("a readable state file");
+    let n = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let numbers: Vec<f64> = bytes[8..].chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();
+    let vectors: Vec<Vec3> = numbers.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect();
+    assert_eq!(vectors.len(), 2 * n, "positions and velocities");
+    (vectors[..n].to_vec(), vectors[n..].to_vec())
+}
+
+fn main() {
+    // Cargo adds `--bench`.
+    let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
+    let [state, out, options @ ..] = words.as_slice() else {
+        println!("usage: cargo bench --bench problems -- STATE OUT [sphere] [young=N/m] [dt=s]");
+        return;
+    };
+    let number = |name: &str, otherwise: f64| {
+        let given = options.iter().find_map(|o| o.strip_prefix(name)?.strip_prefix('='));
+        given.map_or(otherwise, |value| value.parse().expect("a number"))
+    };
+    let (dt, young, range) = (number("dt", 0.004), number("young", CLOTH.young), number("range", 0.004));
+    let (mut x, v) = read_state(state);
+    let n = x.len();
+    let rest = cloth_grid((n as f64).sqrt().round() as usize, 1.0);
+    let cloth = Deformable::sheet(&rest, Sheet { young, ..CLOTH });
+    let step = cloth.linear_step(&x, &v, [0.0, 0.0, -9.81], dt);
+    let mut faces = rest.faces.clone();
+    let mut close = half_space_pairs(&x, [0.0, 0.0, 1.0], 0.0, range);
+    if options.iter().any(|o| o == "sphere") {
+        let ball = sphere([0.02, 0.03, 0.25], 0.25, 4);
+        faces.extend(ball.faces.iter().map(|f| f.map(|v| v + n as u32)));
+        x.extend(ball.positions);
+    }
+    let body: Vec<u32> = (0..x.len()).map(|i| u32::from(i >= n)).collect();
+    let edges = edges_of(&faces);
+    let surfaces = Surfaces {
+        faces: &faces,
+        edges: &edges,
+        body: &body,
+        self_contact: &[true, false],
+        prescribed: &[false, true],
+    };
+    close.extend(pairs(&x, &surfaces, range));
+    let nearest = close.iter().map(|p| p.distance).fold(f64::INFINITY, f64::min);
+    let problem = Problem::new(step.matrix, step.velocities, &close, RowChoice { thickness: 0.002, friction: 0.3, dt });
+    problem.save(std::path::Path::new(out)).expect("a writable file");
+    println!(
+        "{out}: {n} vertices, {} blocks, {} contacts, nearest {:.3} mm, |v*| {:.3} m/s",
+        problem.matrix.columns.len(),
+        problem.rows.len(),
+        1e3 * nearest,
+        problem.velocity_scale()
+    );
+}

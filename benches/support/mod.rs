@@ -1,0 +1,17 @@
+//! A small simulation host written against the public API only, used by benches, scene tests and examples.
+//!
+//! * `shapes`: cloth grids, spheres, boxes of tetrahedra
+//! * `membrane`, `bending`, `tetrahedra`: elastic energies with their gradients and stiffness
+//! * `deformable`: lumped masses, the implicit matrix A and right-hand side b of one linearised step
+//! * `conjugate_gradient`: tight solves, independent of the library's own solvers
+//! * `nearby`: close pairs by a plain grid search, independent of the library's detection
+//! * `problem`: a contact problem as a value: assembled from a state, written to and read from files
+
+pub mod bending;
+pub mod conjugate_gradient;
+pub mod deformable;
+pub mod membrane;
+pub mod nearby;
+pub mod problem;
+pub mod shapes;
+pub mod tetrahedra;
