@@ -1,0 +1,4 @@
+//! Kernels against independent oracles.
+
+mod ccd_distance;
+mod ccd_separation;
