@@ -1,4 +1,6 @@
-//! Kernels against independent oracles.
+//! The library against independent answers: exact arithmetic, closed forms, brute force, other algorithms.
 
 mod ccd_distance;
 mod ccd_separation;
+mod distance;
+mod random;
