@@ -1,4 +1,7 @@
-//! Writes contact problems from recorded cloth states.
+//! Writes contact problems from recorded cloth states, and of soft boxes heaped up.
+//!
+//! `cargo bench --bench problems -- boxes ACROSS STEPS OUT [dt=0.03]` lets ACROSS x ACROSS x 5 boxes fall for STEPS steps of
+//! 5 ms; the problem lists pairs nearer than 40 mm, thickness 10 mm, friction 0.4.
 //!
 //! `cargo bench --bench problems -- STATE OUT [sphere] [young=1000] [dt=0.004]`: STATE holds, little-endian, the `u64`
 //! number of vertices of a square 1 m cloth, its positions and its velocities as `f64`. The problem lists every pair
@@ -9,6 +12,7 @@
 mod support;
 
 use signorini::math::Vec3;
+use support::boxes::{Boxes, RUBBER};
 use support::deformable::{CLOTH, Deformable, Sheet};
 use support::nearby::{Surfaces, pairs};
 use support::problem::{Problem, RowChoice, half_space_pairs};
@@ -23,9 +27,35 @@ fn read_state(path: &str) -> (Vec<Vec3>, Vec<Vec3>) {
     (vectors[..n].to_vec(), vectors[n..].to_vec())
 }
 
+fn boxes(across: usize, steps: usize, out: &str, dt: f64) {
+    let boxes = Boxes::new(across, 5, 7);
+    let solids = Deformable::solid(&boxes.rest, RUBBER);
+    let (x, v) = boxes.heaped(&solids, steps, 0.005);
+    let step = solids.linear_step(&x, &v, [0.0, 0.0, -9.81], dt);
+    let close = boxes.pairs(&x, 0.04);
+    write(Problem::new(step.matrix, step.velocities, &close, RowChoice { thickness: 0.01, friction: 0.4, dt }), out);
+}
+
+fn write(problem: Problem, out: &str) {
+    problem.save(std::path::Path::new(out)).expect("a writable file");
+    println!(
+        "{out}: {} block rows, {} blocks, {} contacts, |v*| {:.3} m/s",
+        problem.matrix.rows(),
+        problem.matrix.columns.len(),
+        problem.rows.len(),
+        problem.velocity_scale()
+    );
+}
+
 fn main() {
     // Cargo adds `--bench`.
     let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
+    if let [kind, across, steps, out, options @ ..] = words.as_slice()
+        && kind == "boxes"
+    {
+        let dt = options.iter().find_map(|o| o.strip_prefix("dt=")).map_or(0.03, |s| s.parse().expect("a number"));
+        return boxes(across.parse().expect("a count"), steps.parse().expect("a count"), out, dt);
+    }
     let [state, out, options @ ..] = words.as_slice() else {
         println!("usage: cargo bench --bench problems -- STATE OUT [sphere] [young=N/m] [dt=s]");
         return;
@@ -57,14 +87,5 @@ fn main() {
         prescribed: &[false, true],
     };
     close.extend(pairs(&x, &surfaces, range));
-    let nearest = close.iter().map(|p| p.distance).fold(f64::INFINITY, f64::min);
-    let problem = Problem::new(step.matrix, step.velocities, &close, RowChoice { thickness: 0.002, friction: 0.3, dt });
-    problem.save(std::path::Path::new(out)).expect("a writable file");
-    println!(
-        "{out}: {n} vertices, {} blocks, {} contacts, nearest {:.3} mm, |v*| {:.3} m/s",
-        problem.matrix.columns.len(),
-        problem.rows.len(),
-        1e3 * nearest,
-        problem.velocity_scale()
-    );
+    write(Problem::new(step.matrix, step.velocities, &close, RowChoice { thickness: 0.002, friction: 0.3, dt }), out);
 }

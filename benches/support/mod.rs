@@ -4,10 +4,12 @@
 //! * `membrane`, `bending`, `tetrahedra`: elastic energies with their gradients and stiffness
 //! * `deformable`: lumped masses, the implicit matrix A and right-hand side b of one linearised step
 //! * `conjugate_gradient`: tight solves, independent of the library's own solvers
+//! * `boxes`: soft boxes in a container, heaped up
 //! * `nearby`: close pairs by a plain grid search, independent of the library's detection
 //! * `problem`: a contact problem as a value: assembled from a state, written to and read from files
 
 pub mod bending;
+pub mod boxes;
 pub mod conjugate_gradient;
 pub mod deformable;
 pub mod membrane;
