@@ -1,10 +1,19 @@
 //! The frictional contact problem [Otaduy09, Eq. 7] over one metric, and the one signature of its solvers.
 
+use super::accelerated_relaxation::{self, Ending};
+use super::block_diagonal;
+use super::friction::project;
+use super::packed_contacts::PackedContacts;
+use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure, velocity_error};
 use crate::constraint::RowSet;
-use crate::linalg::BlockMatrix;
-use crate::math::{Mat3, Vec3};
+use crate::linalg::{BlockMatrix, SinglePrecision};
+use crate::math::{Mat3, Vec3, is_finite, mat_vec};
 use crate::model::Settings;
 use crate::parallel::Par;
+
+/// Fraction of the velocity scale that a block of mean mass would take from the smallest impulse that counts: the floor
+/// of the dynamics residual while no contact is active.
+const IMPULSE_FLOOR: f64 = 1e-2;
 
 /// Find `dv`, `p = (lambda, gamma)` with `A dv = C^T p`, `0 <= lambda perp J dv >= c`, and friction within its limit.
 ///
@@ -33,27 +42,142 @@ pub struct SolverReport {
     pub friction_residual: f64,
     /// `|A dv - C^T p| / |C^T p|` in the norm of the inverse diagonal.
     pub dynamics_residual: f64,
-    /// Estimated `|dv - dv_exact| / |dv_exact|`.
+    /// Estimated `|dv - dv_exact| / |dv_exact|` in the norm of A.
     pub velocity_error: f64,
     /// Outer iterations at which the paper's 5 % criterion would have stopped [Otaduy09, §5.5]; 0 if never.
     pub paper_iterations: u32,
+    /// Times one solver handed over to another.
+    pub hand_overs: u32,
+    /// Work done: blocks of A multiplied plus contacts visited. The same on every machine.
+    pub work: u64,
 }
 
 /// Buffers of the solvers: capacity only, emptying it changes no bit.
 #[derive(Default)]
-pub struct SolverScratch {}
+pub struct SolverScratch {
+    measure: MeasureBuffers,
+}
 
 /// Solves the problem with the solver that the settings choose.
 ///
 /// `impulses` holds a warm start on entry (zero for new contacts) and the multipliers on return; `dv` likewise.
-/// Always ends: at most `settings.iterations_max` outer iterations.
+/// Always ends: at most `settings.iterations_max` outer iterations. Blocks without off-diagonal entries (lumped masses,
+/// rigid bodies) leave with `dv = D^-1 C^T p` to rounding, at any number of iterations: momentum is exact for them.
+/// Values that are not finite in the warm start are dropped; the result is finite.
 pub fn solve(
-    _problem: &ContactProblem,
-    _impulses: &mut [Vec3],
-    _dv: &mut [Vec3],
-    _settings: &Settings,
-    _scratch: &mut SolverScratch,
-    _par: Par,
+    problem: &ContactProblem,
+    impulses: &mut [Vec3],
+    dv: &mut [Vec3],
+    settings: &Settings,
+    scratch: &mut SolverScratch,
+    par: Par,
 ) -> SolverReport {
-    SolverReport::default()
+    let packed = PackedContacts::new(problem, par);
+    let task = Task {
+        problem,
+        packed: &packed,
+        settings,
+        velocity_scale: velocity_scale(problem),
+        impulse_floor: impulse_floor(problem, &packed),
+        par,
+    };
+    let coupled: Vec<bool> = (0..dv.len()).map(|b| is_coupled(problem, b)).collect();
+    let mut at = warm_start(&task, impulses, dv);
+    let mut work = Work::default();
+    let mut report = SolverReport::default();
+    if packed.contacts.is_empty() {
+        at.dv.fill([0.0; 3]);
+        report.converged = true;
+    } else if coupled.iter().any(|c| *c) {
+        let single = SinglePrecision::new(problem.matrix, par);
+        let max = settings.iterations_max;
+        let run = accelerated_relaxation::run(&task, &single, &coupled, &mut at, max, &mut scratch.measure, &mut work);
+        report.iterations = run.iterations;
+        report.converged = run.ending == Ending::Converged;
+    } else {
+        let (iterations, converged) = block_diagonal::solve(&task, &mut at, settings.iterations_max, &mut work);
+        report.iterations = iterations;
+        report.converged = converged;
+    }
+    finish(&task, &coupled, &mut at, &mut scratch.measure, &mut work, &mut report);
+    for (c, contact) in packed.contacts.iter().enumerate() {
+        impulses[contact.source as usize] = at.p[c];
+    }
+    dv.copy_from_slice(&at.dv);
+    report
+}
+
+/// The scale that residuals are relative to: the problem's, else the largest target, else 1.
+fn velocity_scale(problem: &ContactProblem) -> f64 {
+    let usable = |s: f64| s > 0.0 && s.is_finite();
+    if usable(problem.velocity_scale) {
+        return problem.velocity_scale;
+    }
+    let targets = problem.rows.normal_targets.iter().fold(0.0f64, |m, c| m.max(c.abs()));
+    if usable(targets) { targets } else { 1.0 }
+}
+
+/// `|C^T p|` in the norm of the inverse diagonal that changes one touched block of mean mass by a small fraction of the
+/// velocity scale.
+fn impulse_floor(problem: &ContactProblem, packed: &PackedContacts) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (b, m) in problem.inverse_diagonal.iter().enumerate() {
+        let trace = m[0][0] + m[1][1] + m[2][2];
+        if trace > 0.0 && packed.touches(b) {
+            sum += 3.0 / trace;
+            count += 1.0;
+        }
+    }
+    let mass: f64 = if count > 0.0 { sum / count } else { 0.0 };
+    (IMPULSE_FLOOR * velocity_scale(problem) * mass.sqrt()).max(f64::MIN_POSITIVE)
+}
+
+/// Whether block row `b` has entries beside its diagonal.
+fn is_coupled(problem: &ContactProblem, b: usize) -> bool {
+    let m = problem.matrix;
+    let range = m.row_offsets[b]..m.row_offsets[b + 1];
+    range.into_iter().any(|k| m.columns[k] as usize != b && m.values[k] != [[0.0; 3]; 3])
+}
+
+/// The warm start in sweep order: multipliers within their limits, infinite masses at rest, nothing that is not finite.
+fn warm_start(task: &Task, impulses: &[Vec3], dv: &[Vec3]) -> Iterate {
+    let inverse = task.problem.inverse_diagonal;
+    let usable = |b: usize| is_finite(dv[b]) && inverse[b] != [[0.0; 3]; 3];
+    let cone = task.settings.friction_cone;
+    Iterate {
+        dv: task.par.map_indexed(dv.len(), |b| if usable(b) { dv[b] } else { [0.0; 3] }),
+        p: task.packed.contacts.iter().map(|c| project(cone, c.friction, impulses[c.source as usize])).collect(),
+    }
+}
+
+/// Makes uncoupled blocks exact, and reports the residuals of what is handed back.
+fn finish(
+    task: &Task,
+    coupled: &[bool],
+    at: &mut Iterate,
+    buffers: &mut MeasureBuffers,
+    work: &mut Work,
+    report: &mut SolverReport,
+) {
+    let sound = |at: &Iterate| at.dv.iter().chain(&at.p).all(|v| is_finite(*v));
+    if !sound(at) {
+        // No response at all satisfies the dynamics exactly, if not the contacts: the caller's fail-safes go on.
+        at.dv.fill([0.0; 3]);
+        at.p.fill([0.0; 3]);
+        report.converged = false;
+    }
+    let mut forces = Vec::new();
+    task.packed.impulses(&at.p, &mut forces, task.par);
+    let inverse = task.problem.inverse_diagonal;
+    for (b, v) in at.dv.iter_mut().enumerate() {
+        if !coupled[b] {
+            *v = mat_vec(&inverse[b], task.packed.gather(b, &forces));
+        }
+    }
+    let residuals = measure(task, at, buffers, work);
+    report.complementarity_residual = residuals.normal;
+    report.friction_residual = residuals.friction;
+    report.dynamics_residual = residuals.dynamics;
+    report.velocity_error = velocity_error(task, at, &residuals, buffers, work);
+    report.work = work.blocks + work.contacts;
 }

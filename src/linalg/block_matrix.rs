@@ -32,6 +32,12 @@ impl BlockMatrix {
         self.diagonal.len()
     }
 
+    /// Diagonal block of row `i`.
+    #[inline]
+    pub fn diagonal_block(&self, i: usize) -> &Mat3 {
+        &self.values[self.diagonal[i]]
+    }
+
     /// Row `i` of `A x`.
     #[inline]
     pub fn row_product(&self, i: usize, x: &[Vec3]) -> Vec3 {
