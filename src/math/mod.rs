@@ -1,6 +1,10 @@
 //! Small numeric kernels that know nothing of meshes or bodies.
 //!
 //! * `vector`: three-vectors and 3x3 matrices as plain arrays
+//! * `integer_polynomial`: exact roots and signs, for the rare cases that floating point leaves open
 
+mod integer_polynomial;
 mod vector;
+pub(crate) use integer_polynomial::decompose;
+pub use integer_polynomial::{IntegerPolynomial, Root};
 pub use vector::*;

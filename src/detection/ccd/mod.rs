@@ -2,9 +2,12 @@
 //!
 //! * `point_triangle`, `edge_edge`: the two kernels
 //! * `separation`: minimum separation, by certified separating directions
+//! * `exact`: the decision in integers that the filters leave open
 //! * `motion`: a pair in relative coordinates and its separating directions
 
 pub mod edge_edge;
+mod exact;
+pub mod filter;
 mod motion;
 pub mod point_triangle;
 pub mod separation;

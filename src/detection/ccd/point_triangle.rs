@@ -1,7 +1,8 @@
 //! Continuous detection of a vertex against a face, vertices in the order `p t0 t1 t2`.
 
+use super::exact::Shape;
 use super::motion::VertexFace;
-use super::separation;
+use super::{filter, separation};
 use crate::math::Vec3;
 
 /// First time in `[0, t_max]` at which the distance of the vertex from the triangle falls below `separation` `[m]`,
@@ -12,4 +13,13 @@ use crate::math::Vec3;
 /// method: [`super::separation`].
 pub fn time_of_impact_with_separation(x0: &[Vec3; 4], x1: &[Vec3; 4], separation: f64, t_max: f64) -> Option<f64> {
     separation::time_of_impact::<3, VertexFace>(x0, x1, separation, t_max)
+}
+
+/// First time in `[0, t_max]` at which the vertex is on the closed triangle; `None` when it never is. Exact: no miss
+/// and no false alarm, collapsed triangles and motions that stay coplanar included.
+///
+/// The motion is linear from `x0` to `x1`. The result is never later than the exact time and at most 1e-6 earlier;
+/// `Some(0.0)` when touching at the start, or when the input is not finite. Method: [`super::filter`].
+pub fn time_of_impact(x0: &[Vec3; 4], x1: &[Vec3; 4], t_max: f64) -> Option<f64> {
+    filter::time_of_impact::<3, VertexFace>(Shape::VertexFace, x0, x1, t_max)
 }

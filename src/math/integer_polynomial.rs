@@ -1,0 +1,419 @@
+//! Polynomials with integer coefficients: exact isolation of their roots in [0, 1], and exact signs at these roots.
+//!
+//! Doubles are integers times a power of two, so a question about doubles that is polynomial in time can be decided
+//! with these and no rounding. Meant for the rare cases that floating-point filters leave open.
+
+use num_bigint::{BigInt, Sign};
+use std::cmp::Ordering;
+
+/// A polynomial, coefficients in ascending order, the last one not zero; empty for the zero polynomial.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct IntegerPolynomial(Vec<BigInt>);
+
+/// -1, 0 or 1.
+fn sign(a: &BigInt) -> i32 {
+    match a.sign() {
+        Sign::Minus => -1,
+        Sign::NoSign => 0,
+        Sign::Plus => 1,
+    }
+}
+
+impl IntegerPolynomial {
+    /// From coefficients in ascending order.
+    pub fn new(mut coefficients: Vec<BigInt>) -> IntegerPolynomial {
+        while coefficients.last().is_some_and(|c| c.sign() == Sign::NoSign) {
+            coefficients.pop();
+        }
+        IntegerPolynomial(coefficients)
+    }
+
+    /// `a + (b - a) t`
+    pub fn linear(a: BigInt, b: BigInt) -> IntegerPolynomial {
+        let slope = b - &a;
+        IntegerPolynomial::new(vec![a, slope])
+    }
+
+    /// Whether all coefficients are zero.
+    pub fn is_zero(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Number of coefficients: degree + 1, or 0 for the zero polynomial.
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn combine(&self, other: &Self, op: impl Fn(&mut BigInt, &BigInt)) -> Self {
+        let mut sum = self.0.clone();
+        sum.resize(self.len().max(other.len()), BigInt::ZERO);
+        for (a, b) in sum.iter_mut().zip(&other.0) {
+            op(a, b);
+        }
+        IntegerPolynomial::new(sum)
+    }
+
+    /// Sum.
+    pub fn add(&self, other: &Self) -> Self {
+        self.combine(other, |a, b| *a += b)
+    }
+
+    /// Difference.
+    pub fn sub(&self, other: &Self) -> Self {
+        self.combine(other, |a, b| *a -= b)
+    }
+
+    /// Product.
+    pub fn mul(&self, other: &Self) -> Self {
+        if self.is_zero() || other.is_zero() {
+            return IntegerPolynomial::default();
+        }
+        let mut product = vec![BigInt::ZERO; self.len() + other.len() - 1];
+        for (i, a) in self.0.iter().enumerate() {
+            for (j, b) in other.0.iter().enumerate() {
+                product[i + j] += a * b;
+            }
+        }
+        IntegerPolynomial(product)
+    }
+
+    fn derivative(&self) -> Self {
+        IntegerPolynomial::new(self.0.iter().enumerate().skip(1).map(|(i, c)| c * i).collect())
+    }
+
+    /// Divided by the largest power of two that divides every coefficient: keeps remainder sequences short.
+    fn without_powers_of_two(mut self) -> Self {
+        let shift = self.0.iter().filter_map(BigInt::trailing_zeros).min().unwrap_or(0);
+        if shift > 0 {
+            for c in &mut self.0 {
+                *c >>= shift;
+            }
+        }
+        self
+    }
+
+    /// A positive multiple of the remainder of `self` by `divisor`, which is not zero, and, where wanted, of the
+    /// quotient as well (another positive multiple is not possible: both carry the same factor).
+    fn pseudo_divide(&self, divisor: &Self, want_quotient: bool) -> (Self, Self) {
+        let lead = &divisor.0[divisor.len() - 1];
+        let negative = sign(lead) < 0;
+        let magnitude = if negative { -lead } else { lead.clone() };
+        let mut rest = self.0.clone();
+        let mut quotient =
+            vec![BigInt::ZERO; if want_quotient { (self.len() + 1).saturating_sub(divisor.len()) } else { 0 }];
+        while rest.len() >= divisor.len() {
+            let shift = rest.len() - divisor.len();
+            let Some(top) = rest.pop() else { break };
+            if sign(&top) == 0 {
+                continue;
+            }
+            let factor = if negative { -top } else { top };
+            for c in rest.iter_mut().chain(&mut quotient) {
+                *c *= &magnitude;
+            }
+            for (i, c) in divisor.0[..divisor.len() - 1].iter().enumerate() {
+                rest[i + shift] -= &factor * c;
+            }
+            if want_quotient {
+                quotient[shift] += factor;
+            }
+        }
+        (IntegerPolynomial::new(rest), IntegerPolynomial::new(quotient))
+    }
+
+    fn remainder(&self, divisor: &Self) -> Self {
+        self.pseudo_divide(divisor, false).0.without_powers_of_two()
+    }
+
+    /// Greatest common divisor up to a constant factor; neither argument zero.
+    fn common_divisor(&self, other: &Self) -> Self {
+        let (mut a, mut b) = (self.clone(), other.clone());
+        while !b.is_zero() {
+            let r = a.remainder(&b);
+            a = std::mem::replace(&mut b, r);
+        }
+        a
+    }
+
+    /// The polynomial with the same roots, each simple, up to a positive or negative factor; not for zero.
+    fn square_free(&self) -> Self {
+        let derivative = self.derivative();
+        if derivative.is_zero() {
+            return self.clone();
+        }
+        let repeated = self.common_divisor(&derivative);
+        if repeated.len() == 1 {
+            return self.clone();
+        }
+        self.pseudo_divide(&repeated, true).1.without_powers_of_two()
+    }
+
+    /// `p(n / 2^k) 2^(k degree)`: the value with its sign, as an integer.
+    fn value_at(&self, n: &BigInt, k: u64) -> BigInt {
+        let mut value = BigInt::ZERO;
+        for (power, c) in self.0.iter().rev().enumerate() {
+            value *= n;
+            value += c << (k * power as u64);
+        }
+        value
+    }
+
+    fn sign_at(&self, n: &BigInt, k: u64) -> i32 {
+        sign(&self.value_at(n, k))
+    }
+
+    /// The roots in [0, 1] in ascending order, each once; none for the zero polynomial.
+    ///
+    /// Cost: Sturm's sequence of the square-free part and one evaluation of it per halving; the number of halvings is
+    /// bounded by the separation of the roots, a polynomial in the length of the coefficients.
+    pub fn roots_in_unit_interval(&self) -> Vec<Root> {
+        let mut roots = Vec::new();
+        if self.len() < 2 {
+            return roots;
+        }
+        let mut rest = self.clone().without_powers_of_two();
+        if sign(&rest.0[0]) == 0 {
+            roots.push(Root::rational(BigInt::ZERO, 0));
+            let zeros = rest.0.iter().take_while(|c| sign(c) == 0).count();
+            rest.0.drain(..zeros);
+        }
+        // All coefficients of one sign: no root above zero.
+        if rest.len() < 2 || rest.0.iter().all(|c| sign(c) >= 0) || rest.0.iter().all(|c| sign(c) <= 0) {
+            return roots;
+        }
+        let simple = rest.square_free();
+        let sequence = simple.sturm_sequence();
+        let zero = BigInt::ZERO;
+        let ends = (variations(&sequence, &zero, 0), variations(&sequence, &BigInt::from(1), 0));
+        isolate(&simple, &sequence, zero, 0, ends, &mut roots);
+        roots
+    }
+
+    fn sturm_sequence(&self) -> Vec<IntegerPolynomial> {
+        let mut sequence = vec![self.clone(), self.derivative()];
+        while sequence[sequence.len() - 1].len() > 1 {
+            let m = sequence.len();
+            let mut next = sequence[m - 2].remainder(&sequence[m - 1]);
+            for c in &mut next.0 {
+                *c *= -1;
+            }
+            sequence.push(next);
+        }
+        sequence
+    }
+}
+
+fn variations(sequence: &[IntegerPolynomial], n: &BigInt, k: u64) -> usize {
+    let (mut count, mut last) = (0, 0);
+    for p in sequence {
+        let s = p.sign_at(n, k);
+        if s != 0 {
+            count += usize::from(last != 0 && s != last);
+            last = s;
+        }
+    }
+    count
+}
+
+/// Roots of `p` in `(n / 2^k, (n + 1) / 2^k]`, given the variations of its Sturm sequence at both ends.
+fn isolate(
+    p: &IntegerPolynomial,
+    sequence: &[IntegerPolynomial],
+    n: BigInt,
+    k: u64,
+    ends: (usize, usize),
+    roots: &mut Vec<Root>,
+) {
+    if ends.0 <= ends.1 {
+        return;
+    }
+    if ends.0 - ends.1 == 1 {
+        let next = &n + 1;
+        if p.sign_at(&next, k) == 0 {
+            roots.push(Root::rational(next, k));
+            return;
+        }
+        let sign_low = p.sign_at(&n, k);
+        if sign_low != 0 {
+            roots.push(Root { n, k, inside: Some((p.clone(), sign_low)) });
+            return;
+        }
+    }
+    let low: BigInt = n << 1;
+    let middle = &low + 1;
+    let at_middle = variations(sequence, &middle, k + 1);
+    isolate(p, sequence, low, k + 1, (ends.0, at_middle), roots);
+    isolate(p, sequence, middle, k + 1, (at_middle, ends.1), roots);
+}
+
+/// A root in [0, 1]: a dyadic number exactly, or the only root of a square-free polynomial inside a dyadic interval.
+#[derive(Clone, Debug)]
+pub struct Root {
+    n: BigInt,
+    k: u64,
+    /// Polynomial and its sign at the lower end; `None` when the root is `n / 2^k` itself. Otherwise the root lies in
+    /// the open interval from `n / 2^k` to `(n + 1) / 2^k`.
+    inside: Option<(IntegerPolynomial, i32)>,
+}
+
+impl Root {
+    /// `n / 2^k` itself.
+    pub fn rational(n: BigInt, k: u64) -> Root {
+        Root { n, k, inside: None }
+    }
+
+    /// A double in [0, 1], exactly. `None` for others.
+    pub fn from_double(t: f64) -> Option<Root> {
+        if !(0.0..=1.0).contains(&t) {
+            return None;
+        }
+        let (mantissa, exponent) = decompose(t);
+        Some(Root::rational(BigInt::from(mantissa), u64::from(exponent.unsigned_abs())))
+    }
+
+    /// Halves the interval until its width is `2^-bits` or less.
+    pub fn refine(&mut self, bits: u64) {
+        let Some((p, sign_low)) = &self.inside else { return };
+        while self.k < bits {
+            let middle: BigInt = (&self.n << 1) + 1;
+            let s = p.sign_at(&middle, self.k + 1);
+            self.k += 1;
+            if s == 0 {
+                self.n = middle;
+                self.inside = None;
+                return;
+            }
+            self.n = if s == *sign_low { middle } else { middle - 1 };
+        }
+    }
+
+    /// The exact sign of `g` at the root.
+    ///
+    /// The interval is refined until g cannot vanish on it; where it does not help, a common divisor with the root's
+    /// polynomial decides whether g is zero there. Ends, since a g that is not zero at the root is bounded away from
+    /// zero there by a bound on resultants.
+    pub fn sign_of(&mut self, g: &IntegerPolynomial) -> i32 {
+        if g.len() < 2 {
+            return g.0.first().map_or(0, sign);
+        }
+        let slope: BigInt = g.0.iter().enumerate().map(|(i, c)| BigInt::from(c.magnitude().clone()) * i).sum();
+        let degree = g.len() as u64 - 1;
+        let mut tested = false;
+        loop {
+            let value = g.value_at(&self.n, self.k);
+            let Some((p, _)) = &self.inside else { return sign(&value) };
+            // On the interval g changes by at most `slope 2^-k`; the value carries the factor `2^(k degree)`.
+            if value.magnitude() > (&slope << (self.k * (degree - 1))).magnitude() {
+                return sign(&value);
+            }
+            if !tested && self.k >= 32 {
+                tested = true;
+                let common = p.common_divisor(g);
+                let next = &self.n + 1;
+                if common.len() > 1 && common.sign_at(&self.n, self.k) * common.sign_at(&next, self.k) < 0 {
+                    return 0;
+                }
+            }
+            let bits = (2 * self.k).max(16);
+            self.refine(bits);
+        }
+    }
+
+    /// Order of the lower ends of the present intervals.
+    pub fn order_of_lower_ends(&self, other: &Root) -> Ordering {
+        (&self.n << other.k).cmp(&(&other.n << self.k))
+    }
+
+    /// Whether the root is greater than the double `t` in [0, 1].
+    pub fn is_above(&mut self, t: f64) -> bool {
+        let (mantissa, exponent) = decompose(t);
+        // g(x) = 2^e x - m has the sign of x - t.
+        let g = IntegerPolynomial::new(vec![-BigInt::from(mantissa), BigInt::from(1) << exponent.unsigned_abs()]);
+        self.sign_of(&g) > 0
+    }
+
+    /// The largest double that is certainly not above the root, within `2^-64` of it plus rounding.
+    pub fn lower_double(&mut self) -> f64 {
+        self.refine(64);
+        let excess = self.n.bits().saturating_sub(53);
+        // Cutting bits rounds towards zero.
+        let mantissa: BigInt = &self.n >> excess;
+        let mantissa = mantissa.iter_u64_digits().next().unwrap_or(0) as f64;
+        scale_by_power_of_two(mantissa, excess as i64 - self.k as i64)
+    }
+}
+
+/// `a 2^e`, rounded towards zero where subnormal, for `0 <= a < 2^53`.
+fn scale_by_power_of_two(a: f64, e: i64) -> f64 {
+    if e < -1074 - 53 {
+        return 0.0;
+    }
+    if e >= -1022 {
+        return a * 2.0_f64.powi(e.min(1023) as i32);
+    }
+    // Subnormal results keep fewer bits: cut them before scaling.
+    let cut = (-1074 - e).max(0) as u32;
+    let kept = if cut > 53 { 0 } else { (a as u64) >> cut };
+    f64::from_bits(kept) * if e > -1074 { 2.0_f64.powi((e + 1074) as i32) } else { 1.0 }
+}
+
+/// `(m, e)` with `|a| = m 2^e`, m odd or zero, for finite a; for `|a| < 2`, e is not above zero when m is odd and not 1.
+pub(crate) fn decompose(a: f64) -> (u64, i32) {
+    let bits = a.to_bits();
+    let biased = ((bits >> 52) & 0x7ff) as i32;
+    let fraction = bits & ((1 << 52) - 1);
+    let (mantissa, exponent) = if biased == 0 { (fraction, -1074) } else { (fraction | 1 << 52, biased - 1075) };
+    if mantissa == 0 {
+        return (0, 0);
+    }
+    let zeros = mantissa.trailing_zeros();
+    (mantissa >> zeros, exponent + zeros as i32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn polynomial(c: &[i64]) -> IntegerPolynomial {
+        IntegerPolynomial::new(c.iter().map(|c| BigInt::from(*c)).collect())
+    }
+
+    #[test]
+    fn roots_are_found_once_each_and_in_order() {
+        // (2t - 1)^2 (3t - 1): 1/3 and 1/2.
+        let p = polynomial(&[-1, 2]).mul(&polynomial(&[-1, 2])).mul(&polynomial(&[-1, 3]));
+        let mut roots = p.roots_in_unit_interval();
+        assert_eq!(roots.len(), 2);
+        let values: Vec<f64> = roots.iter_mut().map(Root::lower_double).collect();
+        assert!(values[0] <= 1.0 / 3.0 && values[0] > 1.0 / 3.0 - 1e-15);
+        assert_eq!(values[1], 0.5);
+        // t (t - 1) (t - 2): the closed interval counts, beyond does not.
+        let p = polynomial(&[0, 1]).mul(&polynomial(&[-1, 1])).mul(&polynomial(&[-2, 1]));
+        let values: Vec<f64> = p.roots_in_unit_interval().iter_mut().map(Root::lower_double).collect();
+        assert_eq!(values, [0.0, 1.0]);
+        assert!(polynomial(&[1, 0, 1]).roots_in_unit_interval().is_empty());
+        assert!(IntegerPolynomial::default().roots_in_unit_interval().is_empty());
+    }
+
+    #[test]
+    fn signs_at_irrational_roots_are_exact() {
+        // 2t^2 - 1 at sqrt(1/2); g = (2t^2 - 1)(t + 3) vanishes there, 10^18-fold close rationals do not.
+        let mut root = polynomial(&[-1, 0, 2]).roots_in_unit_interval().remove(0);
+        assert_eq!(root.sign_of(&polynomial(&[-1, 0, 2]).mul(&polynomial(&[3, 1]))), 0);
+        let (below, above) = (707_106_781_186_547_524_i64, 707_106_781_186_547_525_i64);
+        assert_eq!(root.sign_of(&polynomial(&[-below, 1_000_000_000_000_000_000])), 1);
+        assert_eq!(root.sign_of(&polynomial(&[-above, 1_000_000_000_000_000_000])), -1);
+        assert!(root.is_above(std::f64::consts::FRAC_1_SQRT_2.next_down()));
+        assert!(!root.is_above(std::f64::consts::FRAC_1_SQRT_2.next_up()));
+        assert_eq!(root.lower_double(), 0.707_106_781_186_547_5_f64.next_down().max(root.lower_double()));
+    }
+
+    #[test]
+    fn doubles_are_taken_apart_exactly() {
+        for a in [1.0, 0.75, 1e-310, 5e-324, 1e300, 0.1] {
+            let (m, e) = decompose(a);
+            assert_eq!(m as f64 * 2.0_f64.powi(e / 2) * 2.0_f64.powi(e - e / 2), a);
+        }
+        assert_eq!(decompose(0.0), (0, 0));
+    }
+}
