@@ -153,6 +153,11 @@ impl Deformable {
 
     /// `A = M + dt (dt + damping) K`, `b = dt F + M v0 + dt damping K v0` and its solution.
     pub fn linear_step(&self, x: &[Vec3], v: &[Vec3], gravity: Vec3, dt: f64) -> LinearStep {
+        self.linear_step_with(x, v, gravity, dt, &[])
+    }
+
+    /// The same with some vertices held: zero velocity, coupled to nothing.
+    pub fn linear_step_with(&self, x: &[Vec3], v: &[Vec3], gravity: Vec3, dt: f64, held: &[usize]) -> LinearStep {
         let mut matrix = self.stiffness(x);
         let mut b = self.elastic_forces(x);
         let mut damped = vec![[0.0; 3]; x.len()];
@@ -161,19 +166,38 @@ impl Deformable {
         }
         let factor = dt * (dt + self.damping_time);
         matrix.values.iter_mut().for_each(|block| *block = mat_scale(factor, block));
-        let mut start = Vec::with_capacity(x.len());
+        let mut velocities = Vec::with_capacity(x.len());
         for (i, &mass) in self.masses.iter().enumerate() {
             let diagonal = &mut matrix.values[matrix.diagonal[i]];
             for (c, row) in diagonal.iter_mut().enumerate() {
                 row[c] += mass;
             }
             let falling = add_scaled(v[i], dt, gravity);
-            start.push(falling);
+            velocities.push(falling);
             b[i] = add_scaled(add_scaled(scale(dt, b[i]), mass, falling), dt * self.damping_time, damped[i]);
         }
-        let mut velocities = start;
+        hold(&mut matrix, held);
+        for &i in held {
+            b[i] = [0.0; 3];
+            velocities[i] = [0.0; 3];
+        }
         conjugate_gradient::solve(&matrix, &b, &mut velocities, 1e-11);
         LinearStep { matrix, right_hand_side: b, velocities }
+    }
+}
+
+/// Uncouples the held vertices.
+fn hold(matrix: &mut BlockMatrix, held: &[usize]) {
+    if held.is_empty() {
+        return;
+    }
+    for row in 0..matrix.rows() {
+        for k in matrix.row_offsets[row]..matrix.row_offsets[row + 1] {
+            let column = matrix.columns[k] as usize;
+            if column != row && (held.contains(&row) || held.contains(&column)) {
+                matrix.values[k] = [[0.0; 3]; 3];
+            }
+        }
     }
 }
 

@@ -6,14 +6,19 @@
 //! * `conjugate_gradient`: tight solves, independent of the library's own solvers
 //! * `boxes`: soft boxes in a container, heaped up
 //! * `nearby`: close pairs by a plain grid search, independent of the library's detection
+//! * `host`, `scenes`: a world that asks the library for its steps, and the worlds of the measurements
+//! * `clock`: processor time
 //! * `problem`: a contact problem as a value: assembled from a state, written to and read from files
 
 pub mod bending;
 pub mod boxes;
+pub mod clock;
 pub mod conjugate_gradient;
 pub mod deformable;
+pub mod host;
 pub mod membrane;
 pub mod nearby;
 pub mod problem;
+pub mod scenes;
 pub mod shapes;
 pub mod tetrahedra;

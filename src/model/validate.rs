@@ -82,7 +82,7 @@ fn check_kind(body: &BodyDescription) -> Result<(), BuildError> {
             let symmetric = (0..3).all(|i| (0..3).all(|j| inertia[i][j] == inertia[j][i]));
             let positive = inertia[0][0] > 0.0 && minor > 0.0 && determinant(inertia) > 0.0;
             let infinite = mass.is_infinite() || (0..3).any(|i| inertia[i][i] == f64::INFINITY);
-            if !infinite && !(positive && symmetric) {
+            if !(infinite || positive && symmetric) {
                 return fail(body.key, 0, determinant(inertia), "inertia is not symmetric positive definite");
             }
             Ok(())
