@@ -1,7 +1,19 @@
 //! Collision detection: pure geometry on arrays.
 //!
-//! * `primitives`: the collision primitives of a whole model, and the pairs found among them
+//! * `primitives`: the collision primitives of a whole model, their motion, and the pairs found among them
+//! * `brute_force`: every pair tested; the oracle of the other structures
+//! * `ownership`, `bvh`, `pair_lists`, `broad_phase`: the same candidates by a tree of boxes
+//! * `proximity`: near pairs at a state, with weights, normals and distances
+//! * `ccd`: continuous detection of one pair
 
+mod broad_phase;
+pub mod brute_force;
+mod bvh;
 pub mod ccd;
+mod ownership;
+mod pair_lists;
 mod primitives;
-pub use primitives::{Candidates, Primitives};
+pub mod proximity;
+
+pub use broad_phase::BroadPhase;
+pub use primitives::{Candidates, Filter, Motion, Primitives};

@@ -1,9 +1,11 @@
 //! Small numeric kernels that know nothing of meshes or bodies.
 //!
+//! * `simd`: four comparisons at once
 //! * `vector`: three-vectors and 3x3 matrices as plain arrays
 //! * `integer_polynomial`: exact roots and signs, for the rare cases that floating point leaves open
 
 mod integer_polynomial;
+pub mod simd;
 mod vector;
 pub(crate) use integer_polynomial::decompose;
 pub use integer_polynomial::{IntegerPolynomial, Root};

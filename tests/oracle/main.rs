@@ -1,6 +1,8 @@
 //! The library against independent answers: exact arithmetic, closed forms, brute force, other algorithms.
 
+mod broad_phase;
 mod ccd_distance;
 mod ccd_separation;
 mod distance;
 mod random;
+mod scenes;

@@ -1,0 +1,81 @@
+//! Candidate sets of the tree against brute force.
+
+use crate::random::Random;
+use crate::scenes::{Scene, grid, scenes};
+use signorini::detection::{BroadPhase, Candidates, Filter, Motion, brute_force};
+use signorini::parallel::{Par, Pool};
+
+fn compare(scene: &Scene, tree: &mut BroadPhase, filter: &Filter, par: Par) -> usize {
+    let p = scene.primitives();
+    let motion = Motion { x0: &scene.x0, x1: &scene.x1, radius: &scene.radius };
+    let mut expected = brute_force::candidates(&p, &motion, filter);
+    expected.edge_face = brute_force::edge_face_candidates(&p, &motion, filter).edge_face;
+    let mut found = Candidates::default();
+    tree.refit(&scene.x0, &scene.x1, &scene.radius, par);
+    tree.candidates(filter, &mut found, par);
+    tree.edge_face_candidates(filter, &mut found, par);
+    assert!(
+        found == expected,
+        "{}: {} {} {} instead of {} {} {}",
+        scene.name,
+        found.vertex_face.len(),
+        found.edge_edge.len(),
+        found.edge_face.len(),
+        expected.vertex_face.len(),
+        expected.edge_edge.len(),
+        expected.edge_face.len()
+    );
+    found.vertex_face.len() + found.edge_edge.len()
+}
+
+#[test]
+fn same_candidates_as_brute_force() {
+    let pool = Pool::new(3).unwrap();
+    let mut total = 0;
+    for scene in scenes() {
+        let mut tree = BroadPhase::build(&scene.primitives());
+        let all = compare(&scene, &mut tree, &|_, _| true, Par::Serial);
+        assert_eq!(all, compare(&scene, &mut tree, &|_, _| true, Par::Pool(&pool)), "{}", scene.name);
+        let between = |a: u32, b: u32| scene.body[a as usize] != scene.body[b as usize];
+        let some = compare(&scene, &mut tree, &between, Par::Serial);
+        assert!(some <= all);
+        assert_eq!(0, compare(&scene, &mut tree, &|_, _| false, Par::Serial));
+        total += all;
+    }
+    assert!(total > 10_000, "the scenes have only {total} candidates");
+}
+
+#[test]
+fn same_candidates_after_refits_and_rebuilds() {
+    let mut r = Random::new(7);
+    let mut scene = grid("moving", 17, 2);
+    let mut tree = BroadPhase::build(&scene.primitives());
+    for step in 0..12 {
+        compare(&scene, &mut tree, &|_, _| true, Par::Serial);
+        // Ever larger jumps: the tree of the first state ends up useless and is rebuilt.
+        let size = 0.02 * 2_f64.powi(step);
+        for (x0, x1) in scene.x0.iter_mut().zip(&mut scene.x1) {
+            *x0 = *x1;
+            *x1 = signorini::math::add_scaled(*x1, if step % 3 == 0 { size } else { 0.01 }, r.vector());
+        }
+    }
+}
+
+#[test]
+fn same_candidates_with_the_boxes_of_any_thread_count() {
+    let scene = grid("large", 60, 2);
+    let filter: &Filter = &|_, _| true;
+    let mut expected = Candidates::default();
+    let mut tree = BroadPhase::build(&scene.primitives());
+    tree.refit(&scene.x0, &scene.x1, &scene.radius, Par::Serial);
+    tree.candidates(filter, &mut expected, Par::Serial);
+    assert!(expected.edge_edge.is_sorted() && expected.vertex_face.is_sorted());
+    for threads in [1, 2, 5] {
+        let pool = Pool::new(threads).unwrap();
+        let mut found = Candidates::default();
+        let mut tree = BroadPhase::build(&scene.primitives());
+        tree.refit(&scene.x0, &scene.x1, &scene.radius, Par::Pool(&pool));
+        tree.candidates(filter, &mut found, Par::Pool(&pool));
+        assert!(found == expected);
+    }
+}
