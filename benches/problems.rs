@@ -3,6 +3,9 @@
 //! `cargo bench --bench problems -- boxes ACROSS STEPS OUT [dt=0.03]` lets ACROSS x ACROSS x 5 boxes fall for STEPS steps of
 //! 5 ms; the problem lists pairs nearer than 40 mm, thickness 10 mm, friction 0.4.
 //!
+//! `cargo bench --bench problems -- sandwich SIDE OUT [speed=0.5]` presses three sheets of SIDE x SIDE vertices between the
+//! ground and a ceiling that comes down at that speed: every layer hands the load on.
+//!
 //! `cargo bench --bench problems -- STATE OUT [sphere] [young=1000] [dt=0.004]`: STATE holds, little-endian, the `u64`
 //! number of vertices of a square 1 m cloth, its positions and its velocities as `f64`. The problem lists every pair
 //! nearer than 4 mm, thickness 2 mm, friction 0.3, the ground z = 0 and, on request, the sphere of the comparison scenes.
@@ -11,12 +14,12 @@
 #[allow(dead_code, unused_imports)]
 mod support;
 
-use signorini::math::Vec3;
-use support::boxes::{Boxes, RUBBER};
+use signorini::math::{Vec3, add, mat_vec};
+use support::boxes::{Boxes, RUBBER, rotation};
 use support::deformable::{CLOTH, Deformable, Sheet};
 use support::nearby::{Surfaces, pairs};
 use support::problem::{Problem, RowChoice, half_space_pairs};
-use support::shapes::{cloth_grid, edges_of, sphere};
+use support::shapes::{Triangles, cloth_grid, edges_of, sphere};
 
 fn read_state(path: &str) -> (Vec<Vec3>, Vec<Vec3>) {
     let bytes = std::fs::read(path).expect("a readable state file");
@@ -34,6 +37,41 @@ fn boxes(across: usize, steps: usize, out: &str, dt: f64) {
     let step = solids.linear_step(&x, &v, [0.0, 0.0, -9.81], dt);
     let close = boxes.pairs(&x, 0.04);
     write(Problem::new(step.matrix, step.velocities, &close, RowChoice { thickness: 0.01, friction: 0.4, dt }), out);
+}
+
+/// Three wavy sheets 3 mm apart, turned against each other, thickness 2 mm, under a falling ceiling.
+fn sandwich(side: usize, out: &str, speed: f64) {
+    let one = cloth_grid(side, 0.5);
+    let (mut rest, mut x) = (Triangles::default(), Vec::new());
+    let mut body = Vec::new();
+    for layer in 0..3u32 {
+        let turn = rotation(0.0, 0.0, 0.3 * f64::from(layer));
+        let first = x.len() as u32;
+        rest.positions.extend(&one.positions);
+        rest.faces.extend(one.faces.iter().map(|f| f.map(|v| v + first)));
+        let height = 0.003 * f64::from(layer + 1);
+        x.extend(one.positions.iter().map(|p| {
+            let wave = 0.0004 * ((20.0 * p[0]).sin() + (17.0 * p[1] + f64::from(layer)).cos());
+            add(mat_vec(&turn, *p), [0.0, 0.0, height + wave])
+        }));
+        body.resize(x.len(), layer);
+    }
+    let sheets = Deformable::sheet(&rest, CLOTH);
+    let (dt, range, ceiling) = (0.004, 0.004, 0.012);
+    let step = sheets.linear_step(&x, &vec![[0.0; 3]; x.len()], [0.0, 0.0, -9.81], dt);
+    let edges = edges_of(&rest.faces);
+    let surfaces =
+        Surfaces { faces: &rest.faces, edges: &edges, body: &body, self_contact: &[false; 3], prescribed: &[false; 3] };
+    let mut close = half_space_pairs(&x, [0.0, 0.0, 1.0], 0.0, range);
+    close.extend(pairs(&x, &surfaces, range));
+    let pressed = close.len();
+    close.extend(half_space_pairs(&x, [0.0, 0.0, -1.0], -ceiling, range));
+    let mut problem =
+        Problem::new(step.matrix, step.velocities, &close, RowChoice { thickness: 0.002, friction: 0.3, dt });
+    for target in &mut problem.rows.normal_targets[pressed..] {
+        *target += speed;
+    }
+    write(problem, out);
 }
 
 fn write(problem: Problem, out: &str) {
@@ -55,6 +93,12 @@ fn main() {
     {
         let dt = options.iter().find_map(|o| o.strip_prefix("dt=")).map_or(0.03, |s| s.parse().expect("a number"));
         return boxes(across.parse().expect("a count"), steps.parse().expect("a count"), out, dt);
+    }
+    if let [kind, side, out, options @ ..] = words.as_slice()
+        && kind == "sandwich"
+    {
+        let speed = options.iter().find_map(|o| o.strip_prefix("speed=")).map_or(0.5, |s| s.parse().expect("a speed"));
+        return sandwich(side.parse().expect("a count"), out, speed);
     }
     let [state, out, options @ ..] = words.as_slice() else {
         println!("usage: cargo bench --bench problems -- STATE OUT [sphere] [young=N/m] [dt=s]");
