@@ -6,15 +6,26 @@
 //! * `packed_contacts`: contacts laid out for relaxation passes
 //! * `friction`: the local solve of one contact
 //! * `residuals`: natural map, dynamics residual, velocity error
+//! * `constraint_set`: the contacts of a segment, which grow from round to round
+//! * `manifold_refinement`: rounds of solving and continuous detection
+//! * `fall_back`: the fail-safes of a segment in their order
+//! * `memory`: warm starts by key and the state certified last
+//! * `commit`: what the parts of a step add up to
 //! * `advance`: the step as a list of stages
 
 mod accelerated_relaxation;
 mod advance;
 mod block_diagonal;
+mod commit;
+mod constraint_set;
+mod fall_back;
 mod friction;
+mod manifold_refinement;
+mod memory;
 mod packed_contacts;
 mod problem;
 mod residuals;
 
-pub use advance::{Memory, Scratch, advance};
+pub use advance::{Scratch, advance};
+pub use memory::{Certified, Memory, RememberedContact};
 pub use problem::{ContactProblem, SolverReport, SolverScratch, solve};

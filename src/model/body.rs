@@ -117,6 +117,8 @@ pub struct Model {
     pub materials: Materials,
     /// Patterns of host systems.
     pub systems: Vec<SystemDescription>,
+    /// Hash of contact vertices, edges and faces: names the topology that caches were built for.
+    pub topology_hash: u64,
 }
 
 impl Model {
@@ -158,6 +160,7 @@ impl Model {
             });
             model.block_count += blocks;
         }
+        model.topology_hash = topology_hash(&model);
         Ok(model)
     }
 
@@ -165,6 +168,20 @@ impl Model {
     pub fn body_index(&self, key: u64) -> Option<usize> {
         self.bodies.binary_search_by_key(&key, |body| body.description.key).ok()
     }
+}
+
+/// FNV-1a over all indices, lists separated by their lengths.
+fn topology_hash(model: &Model) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut mix = |word: u64| hash = (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3);
+    mix(model.contact_vertices.len() as u64);
+    model.contact_vertices.iter().for_each(|v| mix(u64::from(*v)));
+    mix(model.edges.len() as u64);
+    model.edges.iter().flatten().for_each(|v| mix(u64::from(*v)));
+    mix(model.faces.len() as u64);
+    model.faces.iter().flatten().for_each(|v| mix(u64::from(*v)));
+    mix(model.vertex_body.len() as u64);
+    hash
 }
 
 /// A tenth of the mean edge length; 0 for surfaces without edges.

@@ -27,15 +27,28 @@ pub struct ContactRecord {
     pub key: u64,
 }
 
-/// Two features that intersect: an edge and a face, or a vertex beyond a half-space.
+/// Two features that intersect or leave no room.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Witness {
-    /// Body keys, `[edge or vertex, face or half-space]`.
+    /// [`Witness::VERTEX_FACE`] and the others.
+    pub kind: u32,
+    /// Body keys, `[edge or vertex, face, edge or half-space]`.
     pub bodies: [u64; 2],
-    /// Local index of the edge (or vertex, for a half-space) and of the face.
+    /// Local indices of the two features; 0 for a half-space.
     pub features: [u32; 2],
-    /// A point of the intersection `[m]`.
+    /// A point of the intersection, or between the two features `[m]`.
     pub point: Vec3,
+}
+
+impl Witness {
+    /// A vertex and a face.
+    pub const VERTEX_FACE: u32 = 0;
+    /// Two edges.
+    pub const EDGE_EDGE: u32 = 1;
+    /// A vertex and a half-space.
+    pub const VERTEX_HALF_SPACE: u32 = 2;
+    /// An edge and a face.
+    pub const EDGE_FACE: u32 = 3;
 }
 
 /// Microseconds by stage. Not part of any hash.

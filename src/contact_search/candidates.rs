@@ -1,0 +1,86 @@
+//! Candidate pairs of a segment, kept while the tentative end positions stay near those they were found for.
+
+use super::pair::BodyFilter;
+use crate::detection::{BroadPhase, Candidates, Primitives};
+use crate::math::{Vec3, sub};
+use crate::model::Model;
+use crate::parallel::Par;
+
+/// Broad phase and candidates. A cache: emptying it changes no bit, since candidates are sorted and then tested
+/// exactly.
+#[derive(Default)]
+pub struct CandidateSearch {
+    broad_phase: Option<(u64, BroadPhase)>,
+    candidates: Candidates,
+    anchor: Option<Anchor>,
+}
+
+/// What the present candidates were found for.
+struct Anchor {
+    topology: u64,
+    x0: Vec<Vec3>,
+    x1: Vec<Vec3>,
+    factor: f64,
+}
+
+impl CandidateSearch {
+    /// Vertex-face and edge-edge pairs whose boxes, swept from `x0` to `x1` and thickened by `factor` times the half
+    /// thicknesses, overlap; a superset of them when kept from an earlier call.
+    ///
+    /// Kept while no end position moved by more than its body's half thickness, which the boxes hold in addition.
+    pub fn update(
+        &mut self,
+        model: &Model,
+        filter: &BodyFilter,
+        x0: &[Vec3],
+        x1: &[Vec3],
+        factor: f64,
+        par: Par,
+    ) -> &Candidates {
+        if self.anchor.as_ref().is_some_and(|anchor| anchor.holds(model, x0, x1, factor)) {
+            return &self.candidates;
+        }
+        let radius: Vec<f64> =
+            model.vertex_body.iter().map(|b| (factor + 1.0) * model.bodies[*b as usize].half_thickness).collect();
+        let primitives = primitives(model);
+        let fresh = self.broad_phase.as_ref().is_none_or(|(topology, _)| *topology != model.topology_hash);
+        if fresh {
+            self.broad_phase = None;
+        }
+        let (_, broad_phase) =
+            self.broad_phase.get_or_insert_with(|| (model.topology_hash, BroadPhase::build(&primitives)));
+        broad_phase.refit(x0, x1, &radius, par);
+        let allowed = |a: u32, b: u32| {
+            filter.allows(model.vertex_body[a as usize] as usize, model.vertex_body[b as usize] as usize)
+        };
+        broad_phase.candidates(&allowed, &mut self.candidates, par);
+        self.anchor = Some(Anchor { topology: model.topology_hash, x0: x0.to_vec(), x1: x1.to_vec(), factor });
+        &self.candidates
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let c = &self.candidates;
+        8 * (c.vertex_face.capacity() + c.edge_edge.capacity() + c.edge_face.capacity())
+            + self.anchor.as_ref().map_or(0, |a| 24 * (a.x0.capacity() + a.x1.capacity()))
+    }
+}
+
+impl Anchor {
+    fn holds(&self, model: &Model, x0: &[Vec3], x1: &[Vec3], factor: f64) -> bool {
+        let near = |(i, (a, b)): (usize, (&Vec3, &Vec3))| {
+            let margin = model.bodies[model.vertex_body[i] as usize].half_thickness;
+            sub(*a, *b).iter().all(|d| d.abs() <= 0.5 * margin)
+        };
+        self.topology == model.topology_hash
+            && self.factor == factor
+            && self.x0 == x0
+            && self.x1.len() == x1.len()
+            && self.x1.iter().zip(x1).enumerate().all(near)
+    }
+}
+
+/// The collision primitives of a model.
+pub fn primitives(model: &Model) -> Primitives<'_> {
+    Primitives { vertices: &model.contact_vertices, edges: &model.edges, faces: &model.faces }
+}

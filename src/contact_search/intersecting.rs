@@ -1,0 +1,109 @@
+//! Exact intersections of a state with witnesses, the tangled components they make, and the sweep between two states.
+
+use super::candidates::{CandidateSearch, primitives};
+use super::near::half_space_pairs;
+use super::pair::BodyFilter;
+use super::passing::Passing;
+use super::swept::{Hit, swept_hits};
+use crate::detection::{BroadPhase, Candidates};
+use crate::math::{Vec3, dot};
+use crate::model::{Model, State, Witness};
+use crate::parallel::Par;
+
+/// Intersections of a state and the vertices of the features involved.
+#[derive(Clone, Debug, Default)]
+pub struct Tangle {
+    /// Edges that cross or touch faces, and vertices beyond half-spaces.
+    pub witnesses: Vec<Witness>,
+    /// Their vertices: the tangled components.
+    pub passing: Passing,
+}
+
+/// All intersections of a state between features that the filter lets collide, by exact predicates.
+///
+/// Features of one surface that touch at rest already do not count. Cost: a broad phase and an exact test per
+/// edge-face pair with overlapping boxes.
+pub fn intersections(model: &Model, filter: &BodyFilter, state: &State, par: Par) -> Tangle {
+    let mut tangle = Tangle::default();
+    let body_of = |v: u32| model.vertex_body[v as usize] as usize;
+    let allowed = |a: u32, b: u32| filter.allows(body_of(a), body_of(b));
+    for found in find(model, &state.positions, &allowed, par) {
+        let (edge, face) = (model.edges[found.edge as usize], model.faces[found.face as usize]);
+        let bodies = [body_of(edge[0]), body_of(face[0])];
+        if bodies[0] == bodies[1] && touches_at_rest(model, edge, face) {
+            continue;
+        }
+        let [a, b] = bodies.map(|i| &model.bodies[i]);
+        tangle.witnesses.push(Witness {
+            kind: Witness::EDGE_FACE,
+            bodies: [a.description.key, b.description.key],
+            features: [found.edge - a.edges.start as u32, found.face - b.faces.start as u32],
+            point: found.point,
+        });
+        edge.iter().chain(&face).for_each(|v| tangle.passing.insert(*v, model.rest.len()));
+    }
+    for pair in half_space_pairs(model, filter) {
+        let [body, plane] = pair.bodies(model);
+        let (x, h) = (state.positions[pair.features[0] as usize], &state.half_spaces[plane]);
+        if dot(h.normal, x) - h.offset < 0.0 {
+            tangle.witnesses.push(half_space_witness(model, pair.features[0], [body, plane], x));
+            tangle.passing.insert(pair.features[0], model.rest.len());
+        }
+    }
+    tangle
+}
+
+fn half_space_witness(model: &Model, vertex: u32, bodies: [usize; 2], point: Vec3) -> Witness {
+    Witness {
+        kind: Witness::VERTEX_HALF_SPACE,
+        bodies: bodies.map(|b| model.bodies[b].description.key),
+        features: [vertex - model.bodies[bodies[0]].vertices.start as u32, 0],
+        point,
+    }
+}
+
+/// Whether an edge and a face of one surface meet in the rest shape, so that their meeting says nothing.
+fn touches_at_rest(model: &Model, edge: [u32; 2], face: [u32; 3]) -> bool {
+    edge_meets_face(&edge.map(|v| model.rest[v as usize]), &face.map(|v| model.rest[v as usize]))
+}
+
+struct Found {
+    edge: u32,
+    face: u32,
+    point: Vec3,
+}
+
+fn find(model: &Model, x: &[Vec3], allowed: &crate::detection::Filter, par: Par) -> Vec<Found> {
+    let mut broad = BroadPhase::build(&primitives(model));
+    broad.refit(x, x, &[], par);
+    let mut candidates = Candidates::default();
+    broad.edge_face_candidates(allowed, &mut candidates, par);
+    let meets = |pair: &&[u32; 2]| {
+        let e = model.edges[pair[0] as usize].map(|v| x[v as usize]);
+        let f = model.faces[pair[1] as usize].map(|v| x[v as usize]);
+        edge_meets_face(&e, &f)
+    };
+    let found =
+        |pair: &[u32; 2]| Found { edge: pair[0], face: pair[1], point: x[model.edges[pair[0] as usize][0] as usize] };
+    candidates.edge_face.iter().filter(meets).map(found).collect()
+}
+
+fn edge_meets_face(e: &[Vec3; 2], f: &[Vec3; 3]) -> bool {
+    let c = |p: Vec3| robust::Coord3D { x: p[0], y: p[1], z: p[2] };
+    let o = |a, b, d, p| robust::orient3d(c(a), c(b), c(d), c(p));
+    let (s0, s1) = (o(f[0], f[1], f[2], e[0]), o(f[0], f[1], f[2], e[1]));
+    if s0 * s1 > 0.0 || (s0 == 0.0 && s1 == 0.0) || (s0 > 0.0) == (s1 > 0.0) && s0 != 0.0 && s1 != 0.0 {
+        return false;
+    }
+    let t = [o(e[0], e[1], f[0], f[1]), o(e[0], e[1], f[1], f[2]), o(e[0], e[1], f[2], f[0])];
+    t.iter().all(|v| *v >= 0.0) || t.iter().all(|v| *v <= 0.0)
+}
+
+/// Hits on straight chords from `before` to `after`: empty when nothing tunnels between two states that a host pushes.
+///
+/// Cost: a broad phase over the sweep and continuous detection of its candidates.
+pub fn swept_free(model: &Model, filter: &BodyFilter, before: &State, after: &State, par: Par) -> Vec<Hit> {
+    let mut search = CandidateSearch::default();
+    let candidates = search.update(model, filter, &before.positions, &after.positions, 1.0, par);
+    swept_hits(model, filter, &Passing::default(), candidates, before, after, par)
+}

@@ -1,0 +1,116 @@
+//! Contacts near the start positions of a segment [Otaduy09, §3.2 (i)].
+
+use super::contact::{Contact, half_space_contact, mesh_contact};
+use super::pair::{BodyFilter, Pair, PairKind, gather};
+use super::passing::Passing;
+use crate::detection::Candidates;
+use crate::math::{Vec3, dot};
+use crate::model::{Kind, Model, State};
+use crate::parallel::Par;
+
+/// All contacts of candidate pairs closer than `factor` times their thickness at `start`, sorted by pair, and of
+/// vertices near half-spaces.
+///
+/// Pairs whose closest points lie on vertices or edges describe the same vertex-edge or vertex-vertex contact many
+/// times; of those the first pair is kept, with the largest thickness. Cost: linear in candidates.
+pub fn near_contacts(
+    model: &Model,
+    filter: &BodyFilter,
+    passing: &Passing,
+    candidates: &Candidates,
+    start: &State,
+    end: &State,
+    factor: f64,
+    par: Par,
+) -> Vec<Contact> {
+    let pairs = (candidates.vertex_face.len(), candidates.edge_edge.len());
+    let found = par.map_indexed(pairs.0 + pairs.1, |i| {
+        near_mesh_pair(model, passing, candidate(candidates, i), &start.positions, factor)
+    });
+    let mut contacts = without_repeats(found.into_iter().flatten().collect());
+    for pair in half_space_pairs(model, filter) {
+        if passing.touches(&pair.features[..1]) {
+            continue;
+        }
+        let [body, plane] = pair.bodies(model);
+        let thickness = model.bodies[body].half_thickness + model.bodies[plane].half_thickness;
+        let x0 = start.positions[pair.features[0] as usize];
+        let contact = half_space_contact(pair, &start.half_spaces[plane], &end.half_spaces[plane], x0, thickness);
+        if contact.start_gap < factor * thickness {
+            contacts.push(contact);
+        }
+    }
+    contacts
+}
+
+/// Candidate number `i`, vertex-face pairs first.
+#[inline]
+pub(super) fn candidate(candidates: &Candidates, i: usize) -> Pair {
+    match candidates.vertex_face.get(i) {
+        Some(features) => Pair { kind: PairKind::VertexFace, features: *features },
+        None => Pair { kind: PairKind::EdgeEdge, features: candidates.edge_edge[i - candidates.vertex_face.len()] },
+    }
+}
+
+/// All vertex-half-space pairs that the filter allows.
+pub(super) fn half_space_pairs<'a>(model: &'a Model, filter: &'a BodyFilter) -> impl Iterator<Item = Pair> + 'a {
+    let planes = model.bodies.iter().enumerate().filter(|(_, b)| matches!(b.description.kind, Kind::HalfSpace(_)));
+    planes.flat_map(move |(plane, _)| {
+        let allowed = move |v: &&u32| filter.allows(model.vertex_body[**v as usize] as usize, plane);
+        model
+            .contact_vertices
+            .iter()
+            .filter(allowed)
+            .map(move |v| Pair { kind: PairKind::VertexHalfSpace, features: [*v, plane as u32] })
+    })
+}
+
+fn near_mesh_pair(model: &Model, passing: &Passing, pair: Pair, x: &[Vec3], factor: f64) -> Option<Contact> {
+    let vertices = pair.vertices(model);
+    if passing.touches(&vertices) {
+        return None;
+    }
+    let [a, b] = pair.bodies(model);
+    let reach = factor * (model.bodies[a].half_thickness + model.bodies[b].half_thickness);
+    let at = gather(vertices, x);
+    let closest = pair.closest_points(&at);
+    if closest.distance_squared >= reach * reach || closest.distance_squared == 0.0 {
+        return None;
+    }
+    let thickness = pair.thickness(model)?;
+    let contact = mesh_contact(model, pair, 0, &closest, &at, &at, thickness);
+    (contact.start_gap < factor * thickness).then_some(contact)
+}
+
+/// Drops contacts whose stencil, reduced to the vertices that carry weight, repeats an earlier one.
+fn without_repeats(contacts: Vec<Contact>) -> Vec<Contact> {
+    let mut reduced: Vec<([u32; 4], usize)> = Vec::new();
+    for (i, contact) in contacts.iter().enumerate() {
+        let mut key = [u32::MAX; 4];
+        for (k, slot) in key.iter_mut().enumerate() {
+            if contact.weights[k] != 0.0 {
+                *slot = contact.vertices[k];
+            }
+        }
+        if key.contains(&u32::MAX) {
+            key.sort_unstable();
+            reduced.push((key, i));
+        }
+    }
+    reduced.sort_unstable();
+    let mut contacts = contacts;
+    let mut dropped = vec![false; contacts.len()];
+    for i in 1..reduced.len() {
+        let ((earlier, kept), (key, index)) = (reduced[i - 1], reduced[i]);
+        // The same vertices may carry two contacts on opposite sides only if the normals differ.
+        if earlier == key && dot(contacts[kept].normal, contacts[index].normal) > 0.5 {
+            let thickness = contacts[kept].thickness.max(contacts[index].thickness);
+            contacts[kept].thickness = thickness;
+            dropped[index] = true;
+            reduced[i].1 = kept;
+        }
+    }
+    let mut keep = dropped.iter().map(|d| !d);
+    contacts.retain(|_| keep.next().unwrap_or(true));
+    contacts
+}

@@ -1,0 +1,33 @@
+//! Continuous detection as a fail-safe sees it: velocities in, hits out.
+
+use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing, swept_hits};
+use crate::math::Vec3;
+use crate::model::{Segment, State};
+use crate::parallel::Par;
+
+/// A segment with all that is needed to test an end of it.
+pub struct Sweep<'a> {
+    /// The segment.
+    pub segment: Segment<'a>,
+    /// Which bodies may touch.
+    pub filter: &'a BodyFilter,
+    /// Tangled vertices.
+    pub passing: &'a Passing,
+    /// Thickening of swept boxes, in half thicknesses.
+    pub factor: f64,
+    /// Where work runs.
+    pub par: Par<'a>,
+}
+
+impl Sweep<'_> {
+    /// End state after `share` of the segment with these velocities, rounded to the hosts' formats, and its hits.
+    pub fn test(&self, velocities: &[Vec3], share: f64, candidates: &mut CandidateSearch) -> (State, Vec<Hit>) {
+        let mut end = State::default();
+        self.segment.end_state(velocities, share, true, &mut end);
+        let start = self.segment.start;
+        let (model, par) = (self.segment.model, self.par);
+        let found = candidates.update(model, self.filter, &start.positions, &end.positions, self.factor, par);
+        let hits = swept_hits(model, self.filter, self.passing, found, start, &end, par);
+        (end, hits)
+    }
+}

@@ -1,0 +1,158 @@
+//! Accounts of a step: what its parts add up to, and the result that the host pulls.
+
+use super::manifold_refinement::{Refined, RoundAccount, Surroundings};
+use crate::contact_search::{Contact, PairKind};
+use crate::math::{Vec3, add, add_scaled, cross, dot, norm, scale, sub};
+use crate::model::{ContactRecord, Drives, Kind, Model, State, StepReport, StepResult};
+
+/// Sums over the parts of a step.
+pub(super) struct StepAccount {
+    /// State reached.
+    pub state: State,
+    /// Mean impulse per block so far, weighted by duration `[N s]`.
+    pub impulses: Vec<Vec3>,
+    /// Velocities of the last part.
+    pub end_velocities: Vec<Vec3>,
+    /// The last part.
+    pub last: Refined,
+    /// Duration of the last part `[s]`.
+    pub last_dt: f64,
+    /// Rounds and residuals.
+    pub rounds: RoundAccount,
+    /// Everything else that is reported.
+    pub report: StepReport,
+}
+
+impl StepAccount {
+    pub fn new(model: &Model, state: &State, drives: &Drives) -> StepAccount {
+        StepAccount {
+            state: state.clone(),
+            impulses: vec![[0.0; 3]; model.block_count],
+            end_velocities: drives.velocities.clone(),
+            last: Refined::default(),
+            last_dt: 0.0,
+            rounds: RoundAccount::default(),
+            report: StepReport { certified_fraction: 1.0, ..StepReport::default() },
+        }
+    }
+
+    /// Takes over a clean part that lasts `share` of the step.
+    pub fn add_part(&mut self, model: &Model, around: &Surroundings, refined: Refined, share: f64, dt: f64) {
+        for (sum, impulse) in self.impulses.iter_mut().zip(&refined.block_impulses) {
+            *sum = add_scaled(*sum, share, *impulse);
+        }
+        let report = &mut self.report;
+        report.parts += 1;
+        let mut angular_error = [0.0; 3];
+        for (row, index) in refined.built.contact.iter().enumerate() {
+            let contact = &refined.set.contacts[*index as usize];
+            let f = refined.set.solved[*index as usize].impulse;
+            let on_fixed = fixed_share(model, around, contact);
+            report.momentum_taken = add_scaled(report.momentum_taken, share * on_fixed, f);
+            let regained = (refined.set.required_gaps[*index as usize] - contact.start_gap).max(0.0);
+            report.recovery_work += share * dot(refined.built.rows.frames[row][0], f) * regained / dt;
+            if contact.pair.kind != PairKind::VertexHalfSpace && on_fixed == 0.0 {
+                let arm = start_separation(contact, &self.state.positions);
+                angular_error = add(angular_error, cross(arm, f));
+            }
+        }
+        report.angular_momentum_error += share * norm(angular_error);
+        self.state.clone_from(&refined.end);
+        self.end_velocities.clone_from(&refined.velocities);
+        self.last = refined;
+        self.last_dt = dt;
+    }
+
+    /// The report, counts and residuals filled in.
+    pub fn finished_report(&mut self) -> StepReport {
+        let (report, rounds) = (&mut self.report, &self.rounds);
+        report.contacts = self.last.built.contact.len() as u32;
+        report.active_contacts = self.last.set.solved.iter().filter(|s| norm(s.impulse) > 0.0).count() as u32;
+        report.rounds = rounds.rounds;
+        report.iterations = rounds.iterations;
+        report.not_converged = rounds.not_converged;
+        report.complementarity_residual = rounds.complementarity;
+        report.friction_residual = rounds.friction;
+        report.dynamics_residual = rounds.dynamics;
+        report.times.search = rounds.search;
+        report.times.rows = rounds.rows;
+        report.times.solve = rounds.solve;
+        report.times.detection = rounds.detection;
+        report.clone()
+    }
+
+    /// What the host pulls besides the end state.
+    pub fn result(&mut self, model: &Model, start: &State, dt: f64) -> StepResult {
+        StepResult {
+            velocities: mean_velocities(model, start, &self.state, dt),
+            end_velocities: std::mem::take(&mut self.end_velocities),
+            impulses: std::mem::take(&mut self.impulses),
+            contacts: contact_records(model, &self.last, &self.state),
+        }
+    }
+}
+
+/// Share of a contact's impulse that its second and first primitive pass on to infinite masses, signed as on the
+/// first: `- sum of the weights that rows feel`.
+fn fixed_share(model: &Model, around: &Surroundings, contact: &Contact) -> f64 {
+    let mut felt = 0.0;
+    for k in 0..4 {
+        let vertex = contact.vertices[k] as usize;
+        let body = &model.bodies[model.vertex_body[vertex] as usize];
+        let block = match body.description.kind {
+            Kind::Deformable { .. } => body.blocks.start + vertex - body.vertices.start,
+            Kind::Rigid { .. } => body.blocks.start,
+            _ => continue,
+        };
+        if !around.metric.fixed[block] {
+            felt += contact.weights[k];
+        }
+    }
+    // Weights sum to zero up to rounding where everything moves.
+    if felt.abs() <= 4.0 * f64::EPSILON { 0.0 } else { -felt }
+}
+
+fn start_separation(contact: &Contact, x0: &[Vec3]) -> Vec3 {
+    crate::contact_search::weighted(&contact.weights, &crate::contact_search::gather(contact.vertices, x0))
+}
+
+/// `(x1 - x0)/dt` per block; angular blocks the mean angular velocity.
+fn mean_velocities(model: &Model, start: &State, end: &State, dt: f64) -> Vec<Vec3> {
+    let mut velocities = vec![[0.0; 3]; model.block_count];
+    for (index, body) in model.bodies.iter().enumerate() {
+        match body.description.kind {
+            Kind::Deformable { .. } => {
+                for (vertex, block) in body.vertices.clone().zip(body.blocks.clone()) {
+                    velocities[block] = scale(1.0 / dt, sub(end.positions[vertex], start.positions[vertex]));
+                }
+            }
+            Kind::Rigid { .. } => {
+                let (linear, angular) = start.poses[index].velocity_to(&end.poses[index], dt);
+                velocities[body.blocks.start] = linear;
+                velocities[body.blocks.start + 1] = angular;
+            }
+            Kind::Kinematic { .. } | Kind::HalfSpace(_) => {}
+        }
+    }
+    velocities
+}
+
+fn contact_records(model: &Model, last: &Refined, end: &State) -> Vec<ContactRecord> {
+    let record = |(contact, solved): (&Contact, &super::constraint_set::Solved)| ContactRecord {
+        bodies: contact.pair.bodies(model).map(|b| model.bodies[b].description.key),
+        kind: contact.pair.kind as u32,
+        features: contact.pair.local_features(model),
+        weights: contact.weights,
+        point: contact.point(&end.positions),
+        normal: contact.normal,
+        distance: contact.gap(&end.positions),
+        impulse: solved.impulse,
+        state: match (norm(solved.impulse) > 0.0, solved.sticks) {
+            (false, _) => 0,
+            (true, true) => 1,
+            (true, false) => 2,
+        },
+        key: contact.pair.key(model, contact.ordinal).number(),
+    };
+    last.set.contacts.iter().zip(&last.set.solved).map(record).collect()
+}

@@ -1,0 +1,131 @@
+//! The set of constraints of a segment, which grows from round to round [Otaduy09, §4].
+
+use super::Memory;
+use crate::constraint::BuiltRows;
+use crate::contact_search::{Contact, Hit, Pair};
+use crate::math::{Vec3, dot, norm};
+use crate::model::{Model, Settings};
+
+/// Share of the required gap that an existing row may miss before a hit of its pair is blamed on the solver.
+const MISSED_SHARE: f64 = 0.05;
+
+/// What the last solve gave a contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Solved {
+    /// Impulse on the first primitive, world frame `[N s]`.
+    pub impulse: Vec3,
+    /// First tangent of its friction frame.
+    pub tangent: Vec3,
+    /// It pushes, and its friction is inside the limit.
+    pub sticks: bool,
+}
+
+/// Contacts, the gaps they must keep, and what is known of their impulses.
+#[derive(Clone, Debug, Default)]
+pub struct ConstraintSet {
+    /// Contacts: first those near the start in pair order, then those found by continuous detection.
+    pub contacts: Vec<Contact>,
+    /// Gap required at the end of the segment `[m]`.
+    pub required_gaps: Vec<f64>,
+    /// First tangent to keep.
+    pub kept_tangents: Vec<Option<Vec3>>,
+    /// Impulse of the last solve, or the warm start.
+    pub solved: Vec<Solved>,
+}
+
+/// How a round of continuous detection changed the set.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Growth {
+    /// Rows added.
+    pub added: usize,
+    /// Hits of pairs whose rows the solver had missed.
+    pub missed: usize,
+}
+
+impl ConstraintSet {
+    /// The set of the contacts near the start, warm-started by key.
+    pub fn new(model: &Model, contacts: Vec<Contact>, memory: &Memory, settings: &Settings, dt: f64) -> ConstraintSet {
+        let mut set = ConstraintSet::default();
+        for contact in contacts {
+            set.push(model, contact, memory, settings, dt);
+        }
+        set
+    }
+
+    fn push(&mut self, model: &Model, contact: Contact, memory: &Memory, settings: &Settings, dt: f64) {
+        let (impulse, tangent) = memory.warm_start(model, &contact, dt);
+        let pushes = dot(contact.normal, impulse) > 0.0;
+        self.required_gaps.push(contact.required_gap(settings.recovery_fraction));
+        self.kept_tangents.push(tangent);
+        self.solved.push(Solved { impulse: if pushes { impulse } else { [0.0; 3] }, ..Solved::default() });
+        self.contacts.push(contact);
+    }
+
+    /// Adds a row for each hit, unless a row of its pair was missed by the solver: then a tighter solve is due.
+    ///
+    /// A pair that is hit a second time although its rows hold gets another row, with the normal of the new impact.
+    pub fn grow(
+        &mut self,
+        model: &Model,
+        hits: &[Hit],
+        end: &[Vec3],
+        memory: &Memory,
+        settings: &Settings,
+        dt: f64,
+        tightened: bool,
+    ) -> Growth {
+        let mut growth = Growth::default();
+        let mut by_pair: Vec<(Pair, usize)> = self.contacts.iter().enumerate().map(|(i, c)| (c.pair, i)).collect();
+        by_pair.sort_unstable();
+        for hit in hits {
+            let first = by_pair.partition_point(|(pair, _)| *pair < hit.pair);
+            let own = by_pair[first..].iter().take_while(|(pair, _)| *pair == hit.pair);
+            let (mut ordinal, mut missed) = (0, false);
+            for (_, i) in own {
+                ordinal = ordinal.max(self.contacts[*i].ordinal + 1);
+                let required = self.required_gaps[*i];
+                missed |= self.contacts[*i].gap(end) < required - MISSED_SHARE * required.abs();
+            }
+            if missed {
+                growth.missed += 1;
+            }
+            if !missed || tightened {
+                growth.added += 1;
+                self.push(model, Contact { ordinal, ..hit.contact }, memory, settings, dt);
+            }
+        }
+        growth
+    }
+
+    /// Warm start of the rows, in their own frames.
+    pub fn row_impulses(&self, built: &BuiltRows) -> Vec<Vec3> {
+        let project = |(row, contact): (usize, &u32)| {
+            let f = self.solved[*contact as usize].impulse;
+            built.rows.frames[row].map(|axis| dot(axis, f))
+        };
+        let mut impulses: Vec<Vec3> = built.contact.iter().enumerate().map(project).collect();
+        for (p, mu) in impulses.iter_mut().zip(&built.rows.friction) {
+            p[0] = p[0].max(0.0);
+            let (size, limit) = ((p[1] * p[1] + p[2] * p[2]).sqrt(), mu * p[0]);
+            if size > limit {
+                p[1] *= limit / size;
+                p[2] *= limit / size;
+            }
+        }
+        impulses
+    }
+
+    /// Takes over the multipliers of a solve.
+    pub fn keep(&mut self, built: &BuiltRows, impulses: &[Vec3]) {
+        self.solved.iter_mut().for_each(|s| *s = Solved::default());
+        for (row, contact) in built.contact.iter().enumerate() {
+            let (p, mu) = (impulses[row], built.rows.friction[row]);
+            let size = norm([0.0, p[1], p[2]]);
+            self.solved[*contact as usize] = Solved {
+                impulse: built.rows.impulse(row, p),
+                tangent: built.rows.frames[row][1],
+                sticks: p[0] > 0.0 && size < (1.0 - 1e-6) * mu * p[0],
+            };
+        }
+    }
+}

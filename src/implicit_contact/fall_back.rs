@@ -1,0 +1,105 @@
+//! The fail-safes of a segment that rounds of refinement left with collisions, in their order.
+
+use super::Scratch;
+use super::manifold_refinement::{Refined, Surroundings};
+use crate::contact_search::{Hit, PairKind, Passing};
+use crate::fail_safe::{Nodes, Sweep, certified_share, hold, rigid_zones};
+use crate::math::{Vec3, add, mat_vec, sub};
+use crate::model::{Model, Segment, State, Witness};
+
+/// What the fail-safes led to.
+pub(super) enum FallBack {
+    /// The segment is clean with these velocities and this end.
+    Resolved {
+        /// The refined segment with velocities, impulses and end replaced.
+        refined: Box<Refined>,
+        /// Zones that moved as rigid bodies.
+        zones: u32,
+        /// Vertices held, those of rigid bodies too.
+        held_vertices: u32,
+        /// Momentum that held nodes lost `[N s]`.
+        momentum_taken: Vec3,
+    },
+    /// Scripted motion leaves no room beyond this share of the segment.
+    Pinched {
+        /// Last certified share.
+        share: f64,
+        /// The state there.
+        state: Box<State>,
+        /// Pairs that leave no room.
+        hits: Vec<Hit>,
+    },
+}
+
+/// Rigid zones, then hold, then the last certified share.
+pub(super) fn fall_back(
+    around: &Surroundings,
+    segment: &Segment,
+    passing: &Passing,
+    refined: Refined,
+    scratch: &mut Scratch,
+) -> FallBack {
+    let sweep = Sweep {
+        segment: *segment,
+        filter: around.filter,
+        passing,
+        factor: around.settings.proximity_factor.max(1.0),
+        par: around.par,
+    };
+    let (metric, candidates) = (around.metric, &mut scratch.candidates);
+    let zones = rigid_zones(&sweep, metric, &refined.velocities, &refined.hits, candidates);
+    if zones.hits.is_empty() {
+        let refined = replaced(around, refined, zones.velocities, zones.end);
+        return FallBack::Resolved {
+            refined: Box::new(refined),
+            zones: zones.zones,
+            held_vertices: 0,
+            momentum_taken: [0.0; 3],
+        };
+    }
+    let holding = hold(&sweep, metric, &refined.velocities, &refined.hits, candidates);
+    if holding.hits.is_empty() {
+        let nodes = Nodes::new(segment.model, metric);
+        let mut momentum_taken = [0.0; 3];
+        let mut held_vertices = 0;
+        for node in &holding.held {
+            let block = nodes.first_block(*node);
+            let lost = mat_vec(&metric.lumped[block], refined.velocities[block]);
+            momentum_taken = add(momentum_taken, lost);
+            held_vertices += nodes.body(*node).map_or(1, |body| segment.model.bodies[body].vertices.len() as u32);
+        }
+        let refined = replaced(around, refined, holding.velocities, holding.end);
+        return FallBack::Resolved { refined: Box::new(refined), zones: 0, held_vertices, momentum_taken };
+    }
+    let (share, state) = certified_share(&sweep, &holding.velocities, &holding.hits, candidates);
+    FallBack::Pinched { share, state: Box::new(state), hits: holding.hits }
+}
+
+/// The segment with other velocities; what the fail-safe changed is booked as impulse over lumped masses.
+fn replaced(around: &Surroundings, mut refined: Refined, velocities: Vec<Vec3>, end: State) -> Refined {
+    for (block, (new, old)) in velocities.iter().zip(&refined.velocities).enumerate() {
+        if !around.metric.fixed[block] {
+            let change = mat_vec(&around.metric.lumped[block], sub(*new, *old));
+            refined.block_impulses[block] = add(refined.block_impulses[block], change);
+        }
+    }
+    refined.velocities = velocities;
+    refined.end = end;
+    refined.hits.clear();
+    refined
+}
+
+/// Witnesses of pairs that leave no room, at the state that was reached.
+pub(super) fn witnesses(model: &Model, hits: &[Hit], state: &State) -> Vec<Witness> {
+    let witness = |hit: &Hit| Witness {
+        kind: match hit.pair.kind {
+            PairKind::VertexFace => Witness::VERTEX_FACE,
+            PairKind::EdgeEdge => Witness::EDGE_EDGE,
+            PairKind::VertexHalfSpace => Witness::VERTEX_HALF_SPACE,
+        },
+        bodies: hit.pair.bodies(model).map(|b| model.bodies[b].description.key),
+        features: hit.pair.local_features(model),
+        point: hit.contact.point(&state.positions),
+    };
+    hits.iter().map(witness).collect()
+}

@@ -1,0 +1,287 @@
+//! Constraint manifold refinement of one segment [Otaduy09, §4, steps 3 and 4].
+
+use super::constraint_set::ConstraintSet;
+use super::{ContactProblem, Memory, Scratch, SolverReport, solve};
+use crate::constraint::{BuiltRows, Linearisation, Metric, build_rows};
+use crate::contact_search::{BodyFilter, Hit, Passing, near_contacts, swept_hits};
+use crate::math::{Vec3, add, mat_vec, norm, scale, sub};
+use crate::model::{Precision, Segment, Settings, State};
+use crate::parallel::Par;
+use std::time::Instant;
+
+/// Factor of the tolerances when the solver missed a row that continuous detection then hit.
+const TIGHTER: f64 = 0.1;
+
+/// Tightest contact tolerance, relative to the velocity scale; below, rounding rules.
+const TIGHTEST: f64 = 1e-9;
+
+/// Share of the smallest thickness that a row may be missed by within the first tolerance.
+const POSITION_SHARE: f64 = 0.1;
+
+/// A row of a turning body whose true gap differs from the linear one by more than this share of the required gap is
+/// linearised anew.
+const LINEARISATION_SHARE: f64 = 0.02;
+
+/// What stays the same over the segments of a step.
+pub(super) struct Surroundings<'a> {
+    pub metric: &'a Metric,
+    pub filter: &'a BodyFilter,
+    pub settings: &'a Settings,
+    pub par: Par<'a>,
+}
+
+/// A tentative end of a segment, clean if `hits` is empty.
+#[derive(Clone, Default)]
+pub(super) struct Refined {
+    /// Velocity per block `[m/s]`.
+    pub velocities: Vec<Vec3>,
+    /// Contact impulse per block `[N s]`.
+    pub block_impulses: Vec<Vec3>,
+    /// End state, rounded to the hosts' formats.
+    pub end: State,
+    /// The constraints with their impulses.
+    pub set: ConstraintSet,
+    /// The rows of the last solve.
+    pub built: BuiltRows,
+    /// Pairs that came too close.
+    pub hits: Vec<Hit>,
+}
+
+/// What the rounds of a segment cost and how well they were solved.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct RoundAccount {
+    pub rounds: u32,
+    pub iterations: u32,
+    pub not_converged: bool,
+    pub complementarity: f64,
+    pub friction: f64,
+    pub dynamics: f64,
+    pub search: f64,
+    pub rows: f64,
+    pub solve: f64,
+    pub detection: f64,
+}
+
+impl RoundAccount {
+    fn add(&mut self, report: &SolverReport) {
+        self.iterations += report.iterations;
+        self.not_converged |= !report.converged;
+        self.complementarity = self.complementarity.max(report.complementarity_residual);
+        self.friction = self.friction.max(report.friction_residual);
+        self.dynamics = self.dynamics.max(report.dynamics_residual);
+    }
+}
+
+/// Microseconds since `from`, which is set to now.
+pub(super) fn lap(from: &mut Instant) -> f64 {
+    let now = Instant::now();
+    let microseconds = now.duration_since(*from).as_secs_f64() * 1e6;
+    *from = now;
+    microseconds
+}
+
+/// Refines the constraint manifold until the tentative end is clean or the rounds are used up.
+pub(super) fn refine(
+    around: &Surroundings,
+    segment: &Segment,
+    passing: &Passing,
+    memory: &Memory,
+    scratch: &mut Scratch,
+    account: &mut RoundAccount,
+) -> Refined {
+    let (model, settings, par) = (segment.model, around.settings, around.par);
+    let mut clock = Instant::now();
+    let mut refined = Refined { velocities: segment.drives.velocities.clone(), ..Refined::default() };
+    let mut linear_end = State::default();
+    segment.end_state(&refined.velocities, 1.0, false, &mut linear_end);
+    let factor = settings.proximity_factor.max(1.0);
+    let x0 = &segment.start.positions;
+    let candidates = scratch.candidates.update(model, around.filter, x0, &linear_end.positions, factor, par);
+    let near = near_contacts(model, around.filter, passing, candidates, segment.start, &linear_end, factor, par);
+    refined.set = ConstraintSet::new(model, near, memory, settings, segment.dt);
+    account.search += lap(&mut clock);
+    let scale_of_motion = fastest(x0, &linear_end.positions, segment.dt);
+    let mut tolerance_factor = 1.0;
+    let mut tightened = false;
+    let mut clean: Option<Refined> = None;
+    for _ in 0..settings.rounds_max.max(1) {
+        account.rounds += 1;
+        solve_round(
+            around,
+            segment,
+            &linear_end,
+            scale_of_motion,
+            tolerance_factor,
+            memory,
+            &mut refined,
+            scratch,
+            account,
+        );
+        clock = Instant::now();
+        segment.end_state(&refined.velocities, 1.0, true, &mut refined.end);
+        let x1 = &refined.end.positions;
+        let candidates = scratch.candidates.update(model, around.filter, x0, x1, factor, par);
+        refined.hits = swept_hits(model, around.filter, passing, candidates, segment.start, &refined.end, par);
+        account.detection += lap(&mut clock);
+        unrounded_end(segment, &refined, &mut linear_end);
+        if refined.hits.is_empty() {
+            let settled = worst_linearisation(segment, &refined, &linear_end) <= LINEARISATION_SHARE;
+            if settled {
+                return refined;
+            }
+            clean = Some(refined.clone());
+            continue;
+        }
+        let end = &linear_end.positions;
+        let growth = refined.set.grow(model, &refined.hits, end, memory, settings, segment.dt, tightened);
+        if growth.missed > 0 {
+            tolerance_factor *= TIGHTER;
+        }
+        tightened = growth.missed > 0;
+    }
+    clean.unwrap_or(refined)
+}
+
+/// Steps 4.1 and 4.2: rows about the last tentative motion, constrained dynamics, new velocities.
+fn solve_round(
+    around: &Surroundings,
+    segment: &Segment,
+    about: &State,
+    scale_of_motion: f64,
+    tolerance_factor: f64,
+    memory: &Memory,
+    refined: &mut Refined,
+    scratch: &mut Scratch,
+    account: &mut RoundAccount,
+) {
+    let mut clock = Instant::now();
+    let (model, metric, unconstrained) = (segment.model, around.metric, &segment.drives.velocities);
+    let about = Linearisation {
+        start: segment.start,
+        end: about,
+        velocities: &refined.velocities,
+        unconstrained,
+        dt: segment.dt,
+    };
+    let set = &mut refined.set;
+    let built = build_rows(model, metric, &set.contacts, &set.required_gaps, &set.kept_tangents, &about);
+    account.rows += lap(&mut clock);
+    if built.rows.is_empty() {
+        refined.velocities.clone_from(unconstrained);
+        refined.block_impulses = vec![[0.0; 3]; model.block_count];
+        refined.built = built;
+        return;
+    }
+    let mut impulses = set.row_impulses(&built);
+    let first = refined.block_impulses.is_empty();
+    let mut dv = if first {
+        remembered_response(segment, metric, memory, &built, &impulses)
+    } else {
+        refined.velocities.iter().zip(unconstrained).map(|(v, u)| sub(*v, *u)).collect()
+    };
+    let demanded = built.rows.normal_targets.iter().fold(0.0_f64, |a, c| a.max(*c));
+    let velocity_scale = positive_or_one(scale_of_motion.max(demanded));
+    let thinnest = set.contacts.iter().fold(f64::INFINITY, |a, c| a.min(c.thickness));
+    let by_thickness = POSITION_SHARE * thinnest / (segment.dt * velocity_scale);
+    let start = around.settings.contact_tolerance;
+    let contact_tolerance = (start.min(by_thickness) * tolerance_factor).max(TIGHTEST.min(start));
+    let settings = Settings {
+        contact_tolerance,
+        velocity_tolerance: around.settings.velocity_tolerance * (contact_tolerance / start).max(1e-3),
+        ..*around.settings
+    };
+    let problem = ContactProblem {
+        matrix: &metric.matrix,
+        inverse_diagonal: &metric.inverse_diagonal,
+        rows: &built.rows,
+        velocity_scale,
+    };
+    let report = solve(&problem, &mut impulses, &mut dv, &settings, &mut scratch.solver, around.par);
+    account.add(&report);
+    set.keep(&built, &impulses);
+    refined.block_impulses = block_impulses(model.block_count, &built, &impulses);
+    refined.built = built;
+    for block in 0..model.block_count {
+        // Where masses are lumped the response is the impulse over the mass, to rounding, whatever the iterations.
+        let response = if metric.uncoupled[block] {
+            mat_vec(&metric.inverse_diagonal[block], refined.block_impulses[block])
+        } else {
+            dv[block]
+        };
+        refined.velocities[block] = add(unconstrained[block], response);
+    }
+    account.solve += lap(&mut clock);
+}
+
+/// `C^T p` per block.
+fn block_impulses(blocks: usize, built: &BuiltRows, impulses: &[Vec3]) -> Vec<Vec3> {
+    let mut out = vec![[0.0; 3]; blocks];
+    for (row, p) in impulses.iter().enumerate() {
+        built.rows.scatter(row, built.rows.impulse(row, *p), &mut out);
+    }
+    out
+}
+
+/// Warm start of the response: last velocity minus v*, on blocks that a warm impulse reaches; zero elsewhere.
+fn remembered_response(
+    segment: &Segment,
+    metric: &Metric,
+    memory: &Memory,
+    built: &BuiltRows,
+    impulses: &[Vec3],
+) -> Vec<Vec3> {
+    let blocks = segment.model.block_count;
+    let mut dv = vec![[0.0; 3]; blocks];
+    let reached = metric.reached(&block_impulses(blocks, built, impulses));
+    for (key, velocities) in &memory.velocities {
+        let Some(body) = segment.model.body_index(*key).map(|b| &segment.model.bodies[b]) else { continue };
+        if body.blocks.len() != velocities.len() {
+            continue;
+        }
+        for (block, v) in body.blocks.clone().zip(velocities) {
+            if reached[block] {
+                dv[block] = sub(*v, segment.drives.velocities[block]);
+            }
+        }
+    }
+    dv
+}
+
+/// The tentative end before rounding; the rounded one where no body is rounded.
+fn unrounded_end(segment: &Segment, refined: &Refined, out: &mut State) {
+    let single = segment.model.bodies.iter().any(|b| b.description.precision == Precision::Single);
+    if single {
+        segment.end_state(&refined.velocities, 1.0, false, out);
+    } else {
+        out.clone_from(&refined.end);
+    }
+}
+
+/// Largest difference between true and linear gap of rows that push, as a share of the required gap.
+fn worst_linearisation(segment: &Segment, refined: &Refined, end: &State) -> f64 {
+    let rows = &refined.built.rows;
+    let response: Vec<Vec3> =
+        refined.velocities.iter().zip(&segment.drives.velocities).map(|(v, u)| sub(*v, *u)).collect();
+    let mut worst = 0.0_f64;
+    for (row, contact) in refined.built.contact.iter().enumerate() {
+        let index = *contact as usize;
+        let turning = rows.angular_offsets[row] != rows.angular_offsets[row + 1];
+        if !turning || norm(refined.set.solved[index].impulse) == 0.0 {
+            continue;
+        }
+        let required = refined.set.required_gaps[index];
+        let excess = rows.velocity(row, &response)[0] - rows.normal_targets[row];
+        let difference = refined.set.contacts[index].gap(&end.positions) - (required + segment.dt * excess);
+        worst = worst.max(difference.abs() / required.abs().max(f64::MIN_POSITIVE));
+    }
+    worst
+}
+
+/// Fastest vertex between two sets of positions `[m/s]`.
+fn fastest(x0: &[Vec3], x1: &[Vec3], dt: f64) -> f64 {
+    x0.iter().zip(x1).fold(0.0_f64, |a, (p, q)| a.max(norm(scale(1.0 / dt, sub(*q, *p)))))
+}
+
+fn positive_or_one(scale: f64) -> f64 {
+    if scale > 0.0 { scale } else { 1.0 }
+}

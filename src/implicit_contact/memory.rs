@@ -1,0 +1,94 @@
+//! What the method remembers from step to step: warm starts by persistent key, and the last certified state.
+
+use super::constraint_set::ConstraintSet;
+use crate::contact_search::{Contact, ContactKey};
+use crate::math::{Vec3, norm, scale};
+use crate::model::{HalfSpace, Model, State};
+
+/// One contact of the last step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RememberedContact {
+    /// Its key.
+    pub key: ContactKey,
+    /// Its impulse, world frame `[N s]`.
+    pub impulse: Vec3,
+    /// Its first tangent, if it stuck.
+    pub tangent: Option<Vec3>,
+}
+
+/// Warm starts by persistent key, and the state that was certified last. Part of a snapshot.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Memory {
+    /// Contacts with an impulse, sorted by key.
+    pub contacts: Vec<RememberedContact>,
+    /// Duration of the segment that they come from `[s]`.
+    pub dt: f64,
+    /// Velocities at the end of the last step, by body key.
+    pub velocities: Vec<(u64, Vec<Vec3>)>,
+    /// Topology and positions that were certified last.
+    pub certified: Option<Certified>,
+}
+
+/// A state known to be free of intersections.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Certified {
+    /// Which topology.
+    pub topology: u64,
+    /// Positions of all vertices.
+    pub positions: Vec<Vec3>,
+    /// Half-spaces of all bodies.
+    pub half_spaces: Vec<HalfSpace>,
+}
+
+impl Memory {
+    /// The remembered contact of this key.
+    pub fn recall(&self, key: &ContactKey) -> Option<&RememberedContact> {
+        self.contacts.binary_search_by(|c| c.key.cmp(key)).ok().map(|i| &self.contacts[i])
+    }
+
+    /// The impulse remembered for a contact, scaled to a segment of `dt`, and the tangent to keep.
+    pub fn warm_start(&self, model: &Model, contact: &Contact, dt: f64) -> (Vec3, Option<Vec3>) {
+        match self.recall(&contact.pair.key(model, contact.ordinal)) {
+            Some(c) if self.dt > 0.0 => (scale(dt / self.dt, c.impulse), c.tangent),
+            _ => ([0.0; 3], None),
+        }
+    }
+
+    /// Whether this very state was certified.
+    pub fn knows(&self, model: &Model, state: &State) -> bool {
+        self.certified.as_ref().is_some_and(|c| {
+            c.topology == model.topology_hash && c.positions == state.positions && c.half_spaces == state.half_spaces
+        })
+    }
+
+    /// Remembers the contacts of a solved segment.
+    pub fn keep_contacts(&mut self, model: &Model, set: &ConstraintSet, dt: f64) {
+        self.dt = dt;
+        self.contacts.clear();
+        for (contact, solved) in set.contacts.iter().zip(&set.solved) {
+            if norm(solved.impulse) > 0.0 {
+                self.contacts.push(RememberedContact {
+                    key: contact.pair.key(model, contact.ordinal),
+                    impulse: solved.impulse,
+                    tangent: solved.sticks.then_some(solved.tangent),
+                });
+            }
+        }
+        self.contacts.sort_unstable_by(|a, b| a.key.cmp(&b.key));
+    }
+
+    /// Remembers velocities per block, by body.
+    pub fn keep_velocities(&mut self, model: &Model, velocities: &[Vec3]) {
+        self.velocities.clear();
+        for body in model.bodies.iter().filter(|b| !b.blocks.is_empty()) {
+            self.velocities.push((body.description.key, velocities[body.blocks.clone()].to_vec()));
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.contacts.len() * std::mem::size_of::<RememberedContact>()
+            + self.velocities.iter().map(|(_, v)| 24 * v.len() + 32).sum::<usize>()
+            + self.certified.as_ref().map_or(0, |c| 24 * c.positions.len() + 32 * c.half_spaces.len())
+    }
+}
