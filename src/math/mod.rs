@@ -1,7 +1,8 @@
 //! Small numeric kernels that know nothing of meshes or bodies.
 //!
-//! * `simd`: four comparisons at once
+//! * `simd`: several numbers at once, with the same bits on every processor
 //! * `vector`: three-vectors and 3x3 matrices as plain arrays
+//! * `simd`: several numbers at once, with the same bits on every processor
 //! * `integer_polynomial`: exact roots and signs, for the rare cases that floating point leaves open
 
 mod integer_polynomial;

@@ -1,6 +1,5 @@
 //! Continuous detection of two edges, vertices in the order `ea0 ea1 eb0 eb1`.
 
-use super::exact::Shape;
 use super::motion::EdgeEdge;
 use super::{filter, separation};
 use crate::math::Vec3;
@@ -12,7 +11,7 @@ use crate::math::Vec3;
 /// start, or when the input is not finite. Never later than the true time. False alarms, the bound on the work and the
 /// method: [`super::separation`].
 pub fn time_of_impact_with_separation(x0: &[Vec3; 4], x1: &[Vec3; 4], separation: f64, t_max: f64) -> Option<f64> {
-    separation::time_of_impact::<4, EdgeEdge>(x0, x1, separation, t_max)
+    separation::first_approach::<4, EdgeEdge>(x0, x1, separation, t_max, separation::MAX_INTERVALS)
 }
 
 /// First time in `[0, t_max]` at which the closed edges share a point; `None` when they never do. Exact: no miss
@@ -21,5 +20,5 @@ pub fn time_of_impact_with_separation(x0: &[Vec3; 4], x1: &[Vec3; 4], separation
 /// The motion is linear from `x0` to `x1`. The result is never later than the exact time and at most 1e-6 earlier;
 /// `Some(0.0)` when touching at the start, or when the input is not finite. Method: [`super::filter`].
 pub fn time_of_impact(x0: &[Vec3; 4], x1: &[Vec3; 4], t_max: f64) -> Option<f64> {
-    filter::time_of_impact::<4, EdgeEdge>(Shape::EdgeEdge, x0, x1, t_max)
+    filter::time_of_impact::<4, EdgeEdge>(x0, x1, t_max)
 }

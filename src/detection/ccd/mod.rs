@@ -2,9 +2,12 @@
 //!
 //! * `point_triangle`, `edge_edge`: the two kernels
 //! * `separation`: minimum separation, by certified separating directions
+//! * `filter`: zero separation, floating-point filters with proven bounds in front of the exact decision
+//! * `coplanarity`: the cubic of the four points and the tests that rule contact out, several pairs at once
 //! * `exact`: the decision in integers that the filters leave open
 //! * `motion`: a pair in relative coordinates and its separating directions
 
+mod coplanarity;
 pub mod edge_edge;
 mod exact;
 pub mod filter;

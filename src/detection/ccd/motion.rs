@@ -5,6 +5,7 @@
 //! when `n·D_k >= s |n|` for every difference. Differences of doubles carry a *relative* rounding error, so nothing in
 //! here loses accuracy far from the origin.
 
+use super::exact::Shape;
 use crate::math::{Vec3, add_scaled, cross, dot, norm, norm_squared, scale, sub};
 
 /// Unit roundoff of f64.
@@ -33,6 +34,9 @@ pub(super) struct Direction {
 
 /// The two kinds of pairs; `N` differences.
 pub(super) trait Kind<const N: usize> {
+    /// The same as a value.
+    const SHAPE: Shape;
+
     /// The differences of four vertices.
     fn differences(x: &[Vec3; 4]) -> [Vec3; N];
     /// The candidate directions of all feature pairs, handed to `visit` with their feature number and weight.
@@ -64,6 +68,8 @@ fn plane_normal(e: Vec3, f: Vec3) -> Vec3 {
 }
 
 impl Kind<3> for VertexFace {
+    const SHAPE: Shape = Shape::VertexFace;
+
     #[inline(always)]
     fn differences(x: &[Vec3; 4]) -> [Vec3; 3] {
         [sub(x[0], x[1]), sub(x[0], x[2]), sub(x[0], x[3])]
@@ -85,6 +91,8 @@ impl Kind<3> for VertexFace {
 }
 
 impl Kind<4> for EdgeEdge {
+    const SHAPE: Shape = Shape::EdgeEdge;
+
     #[inline(always)]
     fn differences(x: &[Vec3; 4]) -> [Vec3; 4] {
         [sub(x[0], x[2]), sub(x[0], x[3]), sub(x[1], x[2]), sub(x[1], x[3])]

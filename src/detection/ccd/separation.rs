@@ -14,7 +14,7 @@
 //! *False alarms.* An alarm is raised at a time where the distance is at most `separation (1 + 2^-10) + 128 u M`, u
 //! the unit roundoff, M the largest coordinate difference between the two primitives at both ends, or when the work
 //! bound is met.
-//! *Work.* At most [`MAX_INTERVALS`] intervals.
+//! *Work.* At most [`MAX_INTERVALS`] intervals (fewer on request).
 
 use super::motion::{
     DIRECTION_ERROR, Direction, Kind, differences_at, fixed_direction_separates, largest_component,
@@ -47,11 +47,12 @@ struct Levels {
 }
 
 /// First time in `[0, t_max]` at which the distance falls below `separation`, conservative; see the module's notes.
-pub(super) fn time_of_impact<const N: usize, K: Kind<N>>(
+pub(super) fn first_approach<const N: usize, K: Kind<N>>(
     x0: &[Vec3; 4],
     x1: &[Vec3; 4],
     separation: f64,
     t_max: f64,
+    intervals: usize,
 ) -> Option<f64> {
     let (mut d0, mut d1) = (K::differences(x0), K::differences(x1));
     let (largest0, largest1) = (largest_component(&d0), largest_component(&d1));
@@ -76,7 +77,7 @@ pub(super) fn time_of_impact<const N: usize, K: Kind<N>>(
         return Some(0.0);
     }
     let levels = Levels { required, alarm: separation * (1.0 + ALARM_TOLERANCE) + 4.0 * error };
-    walk::<N, K>(&d0, &d1, levels, t_max.clamp(0.0, 1.0))
+    walk::<N, K>(&d0, &d1, levels, t_max.clamp(0.0, 1.0), intervals)
 }
 
 /// A power of two within a factor two of `1 / a`; 1 for zero.
@@ -94,7 +95,13 @@ fn sample<const N: usize, K: Kind<N>>(d0: &[Vec3; N], d1: &[Vec3; N], t: f64) ->
     Some(Sample { t, d, direction })
 }
 
-fn walk<const N: usize, K: Kind<N>>(d0: &[Vec3; N], d1: &[Vec3; N], levels: Levels, t_max: f64) -> Option<f64> {
+fn walk<const N: usize, K: Kind<N>>(
+    d0: &[Vec3; N],
+    d1: &[Vec3; N],
+    levels: Levels,
+    t_max: f64,
+    intervals: usize,
+) -> Option<f64> {
     let Some(mut left) = sample::<N, K>(d0, d1, 0.0) else { return Some(0.0) };
     if left.direction.gap < levels.required {
         return Some(0.0);
@@ -113,7 +120,7 @@ fn walk<const N: usize, K: Kind<N>>(d0: &[Vec3; N], d1: &[Vec3; N], levels: Leve
     let mut count = 1;
     // Whether the farthest end in the list is a time at which the pair is too close.
     let mut blocked = last.direction.gap < levels.required;
-    for _ in 0..MAX_INTERVALS {
+    for _ in 0..intervals {
         if count == 0 {
             return if blocked { Some(left.t) } else { None };
         }

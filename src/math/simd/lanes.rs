@@ -1,0 +1,132 @@
+//! A few doubles side by side, and running one kernel with the widest instructions the machine has.
+//!
+//! The operations are the same ones in the same order on every path and there is no fused multiply-add, so a kernel
+//! gives the same bits on every machine.
+
+use std::ops::{Add, Mul, Sub};
+
+/// `N` independent doubles; all operations go lane by lane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(32))]
+pub struct Lanes<const N: usize>(pub [f64; N]);
+
+impl<const N: usize> Lanes<N> {
+    /// The same value in every lane.
+    #[inline(always)]
+    pub fn splat(a: f64) -> Self {
+        Lanes([a; N])
+    }
+
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        let mut out = self.0;
+        for (a, b) in out.iter_mut().zip(other.0) {
+            *a = f(*a, b);
+        }
+        Lanes(out)
+    }
+
+    /// The smaller of two, lane by lane; the second where one is NaN.
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+
+    /// The greater of two, lane by lane; the second where one is NaN.
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+
+    /// Absolute values.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Lanes(self.0.map(f64::abs))
+    }
+
+    /// Square roots.
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        Lanes(self.0.map(f64::sqrt))
+    }
+
+    /// Negated values.
+    #[inline(always)]
+    pub fn negate(self) -> Self {
+        Lanes(self.0.map(|a| -a))
+    }
+}
+
+impl<const N: usize> Add for Lanes<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+}
+
+impl<const N: usize> Sub for Lanes<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+}
+
+impl<const N: usize> Mul for Lanes<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+}
+
+/// Something to run with wide instructions; `run` should be `#[inline(always)]`, so that it is compiled once per path.
+pub trait Kernel {
+    /// What it gives.
+    type Output;
+    /// The work.
+    fn run(self) -> Self::Output;
+}
+
+/// Runs a kernel compiled for AVX2 where the machine has it, and for the build's target otherwise.
+#[inline]
+pub fn run_wide<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the feature is present on this machine.
+            return unsafe { run_avx2(kernel) };
+        }
+    }
+    kernel.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+unsafe fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Sums<'a>(&'a [Lanes<4>]);
+
+    impl Kernel for Sums<'_> {
+        type Output = Lanes<4>;
+        #[inline(always)]
+        fn run(self) -> Lanes<4> {
+            self.0.iter().fold(Lanes::splat(0.0), |s, a| s + *a * *a - a.abs().sqrt().min(s.max(*a)))
+        }
+    }
+
+    #[test]
+    fn wide_and_plain_paths_give_the_same_bits() {
+        let data: Vec<Lanes<4>> =
+            (0..1000).map(|i| Lanes([0, 1, 2, 3].map(|l| f64::sin((4 * i + l) as f64)))).collect();
+        let (wide, plain) = (run_wide(Sums(&data)), Sums(&data).run());
+        assert_eq!(wide.0.map(f64::to_bits), plain.0.map(f64::to_bits));
+    }
+}
