@@ -152,7 +152,7 @@ fn reference(problem: &Problem, file: &Path) -> Vec<Vec3> {
         solver: SolverChoice::AcceleratedRelaxation,
         contact_tolerance: 1e-8,
         velocity_tolerance: 1e-6,
-        iterations_max: 60_000,
+        iterations_max: 20_000,
         ..Settings::default()
     };
     let (ms, dv, report) = run(problem, &settings, false);

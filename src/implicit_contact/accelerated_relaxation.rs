@@ -8,12 +8,10 @@
 
 use super::friction::LocalMetric;
 use super::packed_contacts::PassContext;
-use super::residuals::{
-    Iterate, MeasureBuffers, Residuals, Task, Work, contact_residuals, dynamics_residual, velocity_error,
-};
+use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work, contact_residuals, dynamics_residual};
+use super::stop_test::{Ending, Run, Stagnation, StopTest, Verdict};
 use crate::linalg::SinglePrecision;
 use crate::math::{Mat3, Vec3, add, add_scaled, dot, mat_scale, mat_vec, scale, sub};
-use crate::model::Settings;
 use crate::parallel::BLOCK;
 
 /// First scale of S relative to the diagonal of A; grows where `e^T A e > e^T S e` is seen.
@@ -27,33 +25,6 @@ const STAGNATION: u32 = 50;
 const PASSES: [u32; 4] = [1, 3, 6, 12];
 /// Of the passes, one in so many visits all contacts; the others those that are near or press.
 const FULL_PASS_EVERY: u32 = 4;
-/// Growth of the merit over the best seen that counts as divergence.
-const GROWTH: f64 = 1e3;
-
-/// How a run of the relaxation ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Ending {
-    /// Tolerances met.
-    Converged,
-    /// The residual no longer falls, with the most passes.
-    Stagnated,
-    /// Work cap.
-    Exhausted,
-}
-
-/// What a run reports.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Run {
-    /// Iterations made.
-    pub iterations: u32,
-    /// How it ended.
-    pub ending: Ending,
-    /// Residuals of the iterate left in place.
-    pub residuals: Residuals,
-    /// Estimated velocity error, when one was computed for it.
-    pub velocity_error: f64,
-}
-
 /// Sums of one product sweep.
 #[derive(Clone, Copy, Default)]
 struct Sums {
@@ -94,13 +65,14 @@ struct Relaxation<'a, 'b> {
     work: Work,
 }
 
-/// Runs from `at` until the tolerances are met, the residual stagnates or `iterations_max`; leaves the best iterate.
+/// Runs from `at` until the tolerances are met, `iterations_max`, or (with `hand_over`) the residual stagnates with the
+/// most passes; leaves the best iterate.
 pub(super) fn run(
     task: &Task,
     single: &SinglePrecision,
     coupled: &[bool],
     at: &mut Iterate,
-    iterations_max: u32,
+    (iterations_max, hand_over): (u32, bool),
     buffers: &mut MeasureBuffers,
     work: &mut Work,
 ) -> Run {
@@ -122,7 +94,7 @@ pub(super) fn run(
     };
     r.set_scale(FIRST_SCALE);
     r.restart_from(at);
-    let outcome = r.iterate(at, iterations_max, buffers);
+    let outcome = r.iterate(at, iterations_max, hand_over, buffers);
     work.blocks += r.work.blocks;
     work.contacts += r.work.contacts;
     outcome
@@ -157,51 +129,41 @@ impl Relaxation<'_, '_> {
         self.work.contacts += self.p.len() as u64;
     }
 
-    fn iterate(&mut self, at: &mut Iterate, iterations_max: u32, buffers: &mut MeasureBuffers) -> Run {
-        let settings = self.task.settings;
-        let mut monitor = Monitor::new();
-        let mut best = Run {
-            iterations: 0,
-            ending: Ending::Exhausted,
-            residuals: Residuals { normal: f64::INFINITY, ..Residuals::default() },
-            velocity_error: f64::INFINITY,
-        };
+    fn iterate(&mut self, at: &mut Iterate, iterations_max: u32, hand_over: bool, buffers: &mut MeasureBuffers) -> Run {
+        let mut test = StopTest::new();
+        let mut stagnation = Stagnation::new(STAGNATION);
+        let mut level = 0;
         let mut k = 0;
         while k < iterations_max {
-            self.passes(PASSES[monitor.level], k);
+            self.passes(PASSES[level], k);
             k += 1;
             let check = k % CHECK_EVERY == 0 || k == iterations_max;
             let sums = self.product(check);
             if check {
                 let residuals = self.residuals(buffers);
-                if residuals.merit() > GROWTH * best.residuals.merit() || !residuals.merit().is_finite() {
-                    // Divergence: a larger metric from the best iterate.
-                    self.set_scale(1.5 * self.metric_scale);
-                    self.restart_from(at);
-                    continue;
-                }
-                if residuals.merit() <= best.residuals.merit() {
-                    at.dv.clone_from(&self.u);
-                    at.p.clone_from(&self.p);
-                    best = Run { residuals, velocity_error: f64::INFINITY, ..best };
-                }
-                if monitor.worth_estimating(settings, &residuals, k) {
-                    let now = Iterate { dv: std::mem::take(&mut self.u), p: std::mem::take(&mut self.p) };
-                    let error = velocity_error(self.task, &now, &residuals, buffers, &mut self.work);
-                    monitor.estimated(error, settings.velocity_tolerance, k);
-                    if error <= settings.velocity_tolerance {
-                        *at = now;
-                        return Run { iterations: k, ending: Ending::Converged, residuals, velocity_error: error };
+                let now = Iterate { dv: std::mem::take(&mut self.u), p: std::mem::take(&mut self.p) };
+                let verdict = test.check(self.task, &now, &residuals, k, at, buffers, &mut self.work);
+                (self.u, self.p) = (now.dv, now.p);
+                match verdict {
+                    Verdict::Converged => return Run { iterations: k, ending: Ending::Converged },
+                    Verdict::Diverged => {
+                        self.set_scale(1.5 * self.metric_scale);
+                        self.restart_from(at);
+                        continue;
                     }
-                    (self.u, self.p) = (now.dv, now.p);
+                    Verdict::Continue => {}
                 }
-                if monitor.stagnated(residuals.merit(), k) {
-                    return Run { iterations: k, ending: Ending::Stagnated, ..best };
+                if stagnation.seen(residuals.merit(), k) {
+                    if level + 1 < PASSES.len() {
+                        level += 1;
+                    } else if hand_over {
+                        return Run { iterations: k, ending: Ending::Stagnated };
+                    }
                 }
             }
             self.extrapolate(sums);
         }
-        Run { iterations: k, ..best }
+        Run { iterations: k, ending: Ending::Exhausted }
     }
 
     /// Relaxes the contacts: all of them now and then, else those that press or are near.
@@ -302,50 +264,5 @@ impl Relaxation<'_, '_> {
                 *u = add(z, add(step, response));
             }
         });
-    }
-}
-
-/// Decides when to estimate the error, to raise the passes, and to give up.
-struct Monitor {
-    /// Index in [`PASSES`].
-    level: usize,
-    /// Merit at the last halving, and when.
-    reference: f64,
-    since: u32,
-    /// No estimate before this iteration.
-    wait_until: u32,
-}
-
-impl Monitor {
-    fn new() -> Monitor {
-        Monitor { level: 0, reference: f64::INFINITY, since: 0, wait_until: 0 }
-    }
-
-    /// An estimate costs some iterations: only when the cheap residuals have passed.
-    fn worth_estimating(&self, settings: &Settings, residuals: &Residuals, iteration: u32) -> bool {
-        iteration >= self.wait_until
-            && residuals.contact() <= settings.contact_tolerance
-            && residuals.dynamics <= settings.velocity_tolerance
-    }
-
-    /// The error falls geometrically at best: waits in proportion to what is missing.
-    fn estimated(&mut self, error: f64, tolerance: f64, iteration: u32) {
-        let missing = (error / tolerance).ln().clamp(0.1, 1.0);
-        self.wait_until = iteration + (f64::from(iteration) * 0.3 * missing) as u32;
-    }
-
-    /// Raises the passes when the merit has not halved for long; true when that is exhausted.
-    fn stagnated(&mut self, merit: f64, iteration: u32) -> bool {
-        if merit <= 0.5 * self.reference {
-            self.reference = merit;
-            self.since = iteration;
-        } else if iteration - self.since >= STAGNATION {
-            if self.level + 1 == PASSES.len() {
-                return true;
-            }
-            self.level += 1;
-            self.since = iteration;
-        }
-        false
     }
 }

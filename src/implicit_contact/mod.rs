@@ -2,6 +2,9 @@
 //!
 //! * `problem`: the contact problem that every solver takes, what it reports, and the choice of the solver
 //! * `accelerated_relaxation`: the default solver
+//! * `iterative_anticipation`: the solver of the paper
+//! * `augmented_lagrangian`: the fallback where rows conflict
+//! * `full_anticipation`: the dense baseline
 //! * `block_diagonal`: the solver for lumped masses and rigid bodies alone
 //! * `packed_contacts`: contacts laid out for relaxation passes
 //! * `friction`: the local solve of one contact
@@ -11,20 +14,25 @@
 //! * `fall_back`: the fail-safes of a segment in their order
 //! * `memory`: warm starts by key and the state certified last
 //! * `commit`: what the parts of a step add up to
+//! * `stop_test`: when a solver ends
 //! * `advance`: the step as a list of stages
 
 mod accelerated_relaxation;
 mod advance;
+mod augmented_lagrangian;
 mod block_diagonal;
 mod commit;
 mod constraint_set;
 mod fall_back;
 mod friction;
+mod full_anticipation;
+mod iterative_anticipation;
 mod manifold_refinement;
 mod memory;
 mod packed_contacts;
 mod problem;
 mod residuals;
+mod stop_test;
 
 pub use advance::{Scratch, advance};
 pub use memory::{Certified, Memory, RememberedContact};

@@ -417,12 +417,6 @@ fn pack(rows: &RowSet, i: usize, inverse: &[Mat3]) -> Contact {
     contact
 }
 
-/// `W^T E W d` for one contact as a world impulse: the stiffness `e` times the seen velocity.
-#[inline(always)]
-pub(super) fn stiffness_impulse(contact: &Contact, rows: &RowSet, e: &Mat3, d: &[Vec3]) -> Vec3 {
-    mat_vec(e, relative_velocity(contact, rows, d))
-}
-
 /// `R^T S R` for a symmetric `S` in the contact's frame.
 pub(super) fn world_stiffness(frame: &[Vec3; 3], s: &Mat3) -> Mat3 {
     let mut e = [[0.0; 3]; 3];

@@ -1,14 +1,15 @@
 //! The frictional contact problem [Otaduy09, Eq. 7] over one metric, and the one signature of its solvers.
 
-use super::accelerated_relaxation::{self, Ending};
-use super::block_diagonal;
 use super::friction::project;
+use super::iterative_anticipation::{self, Inner};
 use super::packed_contacts::PackedContacts;
 use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure, velocity_error};
+use super::stop_test::{Ending, Run};
+use super::{accelerated_relaxation, augmented_lagrangian, block_diagonal, full_anticipation};
 use crate::constraint::RowSet;
 use crate::linalg::{BlockMatrix, SinglePrecision};
 use crate::math::{Mat3, Vec3, is_finite, mat_vec};
-use crate::model::Settings;
+use crate::model::{Settings, SolverChoice};
 use crate::parallel::Par;
 
 /// Fraction of the velocity scale that a block of mean mass would take from the smallest impulse that counts: the floor
@@ -88,16 +89,8 @@ pub fn solve(
     if packed.contacts.is_empty() {
         at.dv.fill([0.0; 3]);
         report.converged = true;
-    } else if coupled.iter().any(|c| *c) {
-        let single = SinglePrecision::new(problem.matrix, par);
-        let max = settings.iterations_max;
-        let run = accelerated_relaxation::run(&task, &single, &coupled, &mut at, max, &mut scratch.measure, &mut work);
-        report.iterations = run.iterations;
-        report.converged = run.ending == Ending::Converged;
     } else {
-        let (iterations, converged) = block_diagonal::solve(&task, &mut at, settings.iterations_max, &mut work);
-        report.iterations = iterations;
-        report.converged = converged;
+        choose(&task, &coupled, &mut at, &mut scratch.measure, &mut work, &mut report);
     }
     finish(&task, &coupled, &mut at, &mut scratch.measure, &mut work, &mut report);
     for (c, contact) in packed.contacts.iter().enumerate() {
@@ -105,6 +98,68 @@ pub fn solve(
     }
     dv.copy_from_slice(&at.dv);
     report
+}
+
+/// Runs the solver that the settings name.
+fn choose(
+    task: &Task,
+    coupled: &[bool],
+    at: &mut Iterate,
+    buffers: &mut MeasureBuffers,
+    work: &mut Work,
+    report: &mut SolverReport,
+) {
+    let max = task.settings.iterations_max;
+    let run = match task.settings.solver {
+        SolverChoice::IterativeAnticipation | SolverChoice::LightAnticipation => {
+            let paper = task.settings.solver == SolverChoice::IterativeAnticipation;
+            let inner = if paper { Inner::Paper } else { Inner::Light };
+            let (run, paper_iterations) = iterative_anticipation::run(task, inner, at, max, buffers, work);
+            report.paper_iterations = paper_iterations;
+            run
+        }
+        SolverChoice::AugmentedLagrangian => augmented_lagrangian::run(task, at, max, buffers, work),
+        SolverChoice::FullAnticipation => full_anticipation::run(task, at, max, buffers, work),
+        SolverChoice::AcceleratedRelaxation => relaxation(task, coupled, at, (max, false), buffers, work),
+        SolverChoice::Automatic if coupled.iter().any(|c| *c) => automatic(task, coupled, at, buffers, work, report),
+        SolverChoice::Automatic => {
+            let (iterations, converged) = block_diagonal::solve(task, at, max, work);
+            Run { iterations, ending: if converged { Ending::Converged } else { Ending::Exhausted } }
+        }
+    };
+    report.iterations = run.iterations;
+    report.converged = run.ending == Ending::Converged;
+}
+
+fn relaxation(
+    task: &Task,
+    coupled: &[bool],
+    at: &mut Iterate,
+    control: (u32, bool),
+    buffers: &mut MeasureBuffers,
+    work: &mut Work,
+) -> Run {
+    let single = SinglePrecision::new(task.problem.matrix, task.par);
+    accelerated_relaxation::run(task, &single, coupled, at, control, buffers, work)
+}
+
+/// Relaxation, and the augmented Lagrangian when that stagnates.
+fn automatic(
+    task: &Task,
+    coupled: &[bool],
+    at: &mut Iterate,
+    buffers: &mut MeasureBuffers,
+    work: &mut Work,
+    report: &mut SolverReport,
+) -> Run {
+    let max = task.settings.iterations_max;
+    let first = relaxation(task, coupled, at, (max, true), buffers, work);
+    if first.ending != Ending::Stagnated {
+        return first;
+    }
+    report.hand_overs += 1;
+    let second = augmented_lagrangian::run(task, at, max - first.iterations, buffers, work);
+    Run { iterations: first.iterations + second.iterations, ending: second.ending }
 }
 
 /// The scale that residuals are relative to: the problem's, else the largest target, else 1.

@@ -113,7 +113,8 @@ pub(super) fn contact_residuals(task: &Task, dv: &[Vec3], p: &[Vec3]) -> Residua
 /// Buffers of [`measure`] and [`velocity_error`].
 #[derive(Default)]
 pub(super) struct MeasureBuffers {
-    impulses: Vec<Vec3>,
+    /// World impulses of the last call.
+    pub impulses: Vec<Vec3>,
     /// `A dv` of the last call.
     pub product: Vec<Vec3>,
     /// `C^T p` of the last call.

@@ -2,12 +2,21 @@
 //!
 //! * `block_matrix`: symmetric 3x3 block-sparse matrices by rows
 //! * `single_precision`: the same in f32, for increments
+//! * `gauss_seidel`: block relaxation
+//! * `conjugate_gradient`: preconditioned conjugate gradients
+//! * `incomplete_cholesky`: a preconditioner
 //! * `colouring`: groups of items that share no block
 
 mod block_matrix;
 mod colouring;
+mod conjugate_gradient;
+mod gauss_seidel;
+mod incomplete_cholesky;
 mod single_precision;
 
 pub use block_matrix::BlockMatrix;
 pub use colouring::{Colouring, colour};
-pub use single_precision::SinglePrecision;
+pub use conjugate_gradient::{GradientBuffers, GradientEnding, conjugate_gradient};
+pub use gauss_seidel::gauss_seidel_sweep;
+pub use incomplete_cholesky::IncompleteCholesky;
+pub use single_precision::{Rounded, SinglePrecision};

@@ -1,0 +1,309 @@
+//! Augmented Lagrangian: contacts as penalties around the current multipliers, minimised over `dv` by Newton steps with
+//! preconditioned conjugate gradients [AlartCurnier91; Bertsekas82]. Slower than relaxation on easy problems, but
+//! conflicting rows only stiffen it, so it is the fallback.
+//!
+//! `phi(dv) = dv^T A dv / 2 + sum |P(p - rho w)|^2 / (2 rho)`, with `rho = k / d`, P the projection on the limits and the
+//! friction bound frozen at the last update of the multipliers: convex and once differentiable.
+
+use super::friction::project_tangent;
+use super::packed_contacts::{contact_velocity, relative_velocity, world_stiffness};
+use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure};
+use super::stop_test::{Ending, Run, StopTest, Verdict};
+use crate::linalg::{GradientBuffers, conjugate_gradient};
+use crate::math::{Mat3, Vec3, add_scaled, dot, inverse, mat_add, mat_scale, mat_vec, norm, sub};
+use crate::model::FrictionCone;
+
+/// Penalty stiffness relative to the effective mass of a contact.
+const STIFFNESS: f64 = 3.0;
+/// Newton steps between two updates of the multipliers at most.
+const NEWTON_STEPS: u32 = 3;
+/// Relative residual of a Newton step's linear solve, and its steps at most.
+const LINEAR_SOLVE: (f64, u32) = (0.3, 100);
+/// Slope left at a full step, relative to the first, that calls for a line search.
+const SLOPE: f64 = 0.3;
+
+/// A contact's penalty.
+#[derive(Clone, Copy, Debug, Default)]
+struct Penalty {
+    /// Normal and tangential stiffness `[kg]`; zero where nothing can move.
+    stiffness: [f64; 2],
+    /// Friction limit, frozen.
+    bound: f64,
+}
+
+struct Lagrangian<'a, 'b> {
+    task: &'b Task<'a>,
+    penalties: Vec<Penalty>,
+    /// `P(p - rho w)` at the current `dv`.
+    trial: Vec<Vec3>,
+    impulses: Vec<Vec3>,
+    /// World stiffness of the contacts that are not free.
+    stiffness: Vec<Option<Mat3>>,
+    gradient: Vec<Vec3>,
+    step: Vec<Vec3>,
+    /// `A dv` and `A step`.
+    product: Vec<Vec3>,
+    step_product: Vec<Vec3>,
+    linear: GradientBuffers,
+    work: Work,
+}
+
+/// Runs from `at` until the tolerances are met or `iterations_max`; leaves the best iterate. Iterations count the steps
+/// of the linear solves, which cost about as much as an iteration of the other solvers.
+pub(super) fn run(
+    task: &Task,
+    at: &mut Iterate,
+    iterations_max: u32,
+    buffers: &mut MeasureBuffers,
+    work: &mut Work,
+) -> Run {
+    let blocks = at.dv.len();
+    let zeros = || vec![[0.0; 3]; blocks];
+    let contacts = at.p.len();
+    let mut l = Lagrangian {
+        task,
+        penalties: task.packed.contacts.iter().map(|c| penalty(c.natural_scale)).collect(),
+        trial: vec![[0.0; 3]; contacts],
+        impulses: Vec::new(),
+        stiffness: vec![None; contacts],
+        gradient: zeros(),
+        step: zeros(),
+        product: zeros(),
+        step_product: zeros(),
+        linear: GradientBuffers::default(),
+        work: Work::default(),
+    };
+    let run = l.iterate(at, iterations_max, buffers);
+    work.blocks += l.work.blocks;
+    work.contacts += l.work.contacts;
+    run
+}
+
+fn penalty([normal, tangent]: [f64; 2]) -> Penalty {
+    let over = |d: f64| if d > 0.0 { STIFFNESS / d } else { 0.0 };
+    Penalty { stiffness: [over(normal), over(tangent)], bound: 0.0 }
+}
+
+impl Lagrangian<'_, '_> {
+    fn iterate(&mut self, at: &mut Iterate, iterations_max: u32, buffers: &mut MeasureBuffers) -> Run {
+        let mut now = at.clone();
+        let mut test = StopTest::new();
+        let mut iterations = 0;
+        self.task.problem.matrix.product(&now.dv, &mut self.product, self.task.par);
+        while iterations < iterations_max {
+            for (penalty, (contact, p)) in self.penalties.iter_mut().zip(self.task.packed.contacts.iter().zip(&now.p)) {
+                penalty.bound = contact.friction * p[0];
+            }
+            for newton in 0..NEWTON_STEPS {
+                let change = self.evaluate(&now);
+                if newton > 0 && self.gradient_velocity() <= 2.0 * change {
+                    break;
+                }
+                let left = iterations_max - iterations;
+                iterations += self.newton_step(left).max(1);
+                self.line_search(&mut now);
+                if iterations >= iterations_max {
+                    break;
+                }
+            }
+            self.evaluate(&now);
+            now.p.copy_from_slice(&self.trial);
+            let residuals = measure(self.task, &now, buffers, &mut self.work);
+            self.product.copy_from_slice(&buffers.product);
+            match test.check(self.task, &now, &residuals, iterations, at, buffers, &mut self.work) {
+                Verdict::Converged => return Run { iterations, ending: Ending::Converged },
+                Verdict::Continue => {}
+                Verdict::Diverged => {
+                    // Softer contacts from the best iterate.
+                    for penalty in &mut self.penalties {
+                        penalty.stiffness = penalty.stiffness.map(|s| 0.3 * s);
+                    }
+                    now.clone_from(at);
+                    self.task.problem.matrix.product(&now.dv, &mut self.product, self.task.par);
+                }
+            }
+        }
+        Run { iterations, ending: Ending::Exhausted }
+    }
+
+    /// Trial multipliers, contact stiffness and gradient at `now`; returns the largest change of a multiplier over its
+    /// stiffness `[m/s]`.
+    fn evaluate(&mut self, now: &Iterate) -> f64 {
+        let Task { problem, packed, settings, par, .. } = *self.task;
+        let penalties = &self.penalties;
+        let cone = settings.friction_cone;
+        par.map_into(&mut self.trial, |c| {
+            let w = contact_velocity(&packed.contacts[c], problem.rows, &now.dv);
+            project_trial(cone, &penalties[c], pulled(&penalties[c], now.p[c], w))
+        });
+        par.map_into(&mut self.stiffness, |c| {
+            let contact = &packed.contacts[c];
+            let y = pulled(&penalties[c], now.p[c], contact_velocity(contact, problem.rows, &now.dv));
+            tangent_stiffness(cone, &penalties[c], y).map(|s| world_stiffness(&contact.frame, &s))
+        });
+        packed.impulses(&self.trial, &mut self.impulses, par);
+        let (f, product) = (&self.impulses, &self.product);
+        par.map_into(&mut self.gradient, |b| sub(product[b], packed.gather(b, f)));
+        self.work.contacts += 4 * now.p.len() as u64;
+        let mut largest = 0.0f64;
+        for ((penalty, trial), p) in self.penalties.iter().zip(&self.trial).zip(&now.p) {
+            let [n, t] = penalty.stiffness;
+            if n > 0.0 {
+                largest = largest.max((trial[0] - p[0]).abs() / n);
+            }
+            if t > 0.0 {
+                largest = largest.max((trial[1] - p[1]).abs().max((trial[2] - p[2]).abs()) / t);
+            }
+        }
+        largest
+    }
+
+    /// Largest `|D^-1 gradient|` `[m/s]`.
+    fn gradient_velocity(&self) -> f64 {
+        let inverse = self.task.problem.inverse_diagonal;
+        self.gradient.iter().zip(inverse).map(|(g, m)| norm(mat_vec(m, *g))).fold(0.0, f64::max)
+    }
+
+    /// Solves for the Newton step; returns the steps of the linear solve.
+    fn newton_step(&mut self, steps_max: u32) -> u32 {
+        let Task { problem, packed, par, .. } = *self.task;
+        let stiffness = &self.stiffness;
+        let preconditioner: Vec<Mat3> = par.map_indexed(self.gradient.len(), |b| {
+            let source = &problem.inverse_diagonal[b];
+            if *source == [[0.0; 3]; 3] || !packed.touches(b) {
+                return *source;
+            }
+            let mut sum = [[0.0; 3]; 3];
+            packed.add_diagonal(b, &mut sum, |c| stiffness[c]);
+            inverse(&mat_add(problem.matrix.diagonal_block(b), &sum)).unwrap_or(*source)
+        });
+        let minus: Vec<Vec3> = self.gradient.iter().map(|g| g.map(|x| -x)).collect();
+        let impulses = &mut self.impulses;
+        let apply = |d: &[Vec3], out: &mut [Vec3]| {
+            par.map_into(impulses, |c| match &stiffness[c] {
+                Some(e) => mat_vec(e, relative_velocity(&packed.contacts[c], problem.rows, d)),
+                None => [0.0; 3],
+            });
+            let f = &*impulses;
+            par.map_into(out, |b| {
+                let y = problem.matrix.row_product(b, d);
+                add_scaled(y, 1.0, packed.gather(b, f))
+            });
+        };
+        let precondition = |r: &[Vec3], z: &mut [Vec3]| par.map_into(z, |b| mat_vec(&preconditioner[b], r[b]));
+        let control = (LINEAR_SOLVE.0, LINEAR_SOLVE.1.min(steps_max));
+        let (steps, _) =
+            conjugate_gradient(apply, precondition, &minus, &mut self.step, true, control, &mut self.linear, par);
+        self.work.blocks += u64::from(steps) * problem.matrix.values.len() as u64;
+        self.work.contacts += u64::from(steps) * 2 * packed.contacts.len() as u64;
+        steps
+    }
+
+    /// Moves `now.dv` along the step, all of it where that leaves a small slope.
+    fn line_search(&mut self, now: &mut Iterate) {
+        let Task { problem, packed, settings, par, .. } = *self.task;
+        problem.matrix.product(&self.step, &mut self.step_product, par);
+        let (step, product, step_product) = (&self.step, &self.product, &self.step_product);
+        let n = step.len();
+        let linear = par.sum(n, |b| dot(step[b], product[b]));
+        let curvature = par.sum(n, |b| dot(step[b], step_product[b]));
+        let seen: Vec<[Vec3; 2]> = par.map_indexed(packed.contacts.len(), |c| {
+            let contact = &packed.contacts[c];
+            let d = relative_velocity(contact, problem.rows, step);
+            let f = &contact.frame;
+            [contact_velocity(contact, problem.rows, &now.dv), [dot(f[0], d), dot(f[1], d), dot(f[2], d)]]
+        });
+        let (penalties, p) = (&self.penalties, &now.p);
+        let slope = |alpha: f64| {
+            let contacts = par.sum(seen.len(), |c| {
+                let [w, d] = seen[c];
+                let y = pulled(&penalties[c], p[c], add_scaled(w, alpha, d));
+                dot(project_trial(settings.friction_cone, &penalties[c], y), d)
+            });
+            linear + alpha * curvature - contacts
+        };
+        self.work.contacts += 3 * seen.len() as u64;
+        let first = slope(0.0);
+        let (mut low, mut high) = (0.0, 1.0);
+        let (mut at_low, mut at_high) = (first, slope(1.0));
+        let mut alpha = 1.0;
+        // The slope grows along the step: a root lies between. False position, with a share of bisection.
+        let mut tries = 0;
+        let mut now_slope = at_high;
+        while now_slope > SLOPE * first.abs() && tries < 12 && first < 0.0 {
+            let secant = low - at_low * (high - low) / (at_high - at_low);
+            let middle = 0.5 * (low + high);
+            alpha = if tries % 3 == 2 || !secant.is_finite() { middle } else { 0.8 * secant + 0.2 * middle };
+            now_slope = slope(alpha);
+            self.work.contacts += seen.len() as u64;
+            if now_slope > 0.0 {
+                (high, at_high) = (alpha, now_slope);
+            } else {
+                (low, at_low) = (alpha, now_slope);
+            }
+            tries += 1;
+        }
+        for (b, dv) in now.dv.iter_mut().enumerate() {
+            *dv = add_scaled(*dv, alpha, step[b]);
+        }
+        for (y, a) in self.product.iter_mut().zip(&self.step_product) {
+            *y = add_scaled(*y, alpha, *a);
+        }
+        self.work.blocks += problem.matrix.values.len() as u64;
+    }
+}
+
+/// `p - rho w`
+#[inline(always)]
+fn pulled(penalty: &Penalty, p: Vec3, w: Vec3) -> Vec3 {
+    let [n, t] = penalty.stiffness;
+    [p[0] - n * w[0], p[1] - t * w[1], p[2] - t * w[2]]
+}
+
+/// Projection with the frozen friction limit.
+#[inline(always)]
+fn project_trial(cone: FrictionCone, penalty: &Penalty, y: Vec3) -> Vec3 {
+    let [g1, g2] = project_tangent(cone, penalty.bound, [y[1], y[2]]);
+    [y[0].max(0.0), g1, g2]
+}
+
+/// Derivative of the penalty impulse by the contact velocity, in the frame of the contact; `None` where it is zero.
+fn tangent_stiffness(cone: FrictionCone, penalty: &Penalty, y: Vec3) -> Option<Mat3> {
+    let [n, t] = penalty.stiffness;
+    let mut s = [[0.0; 3]; 3];
+    if y[0] > 0.0 {
+        s[0][0] = n;
+    }
+    let bound = penalty.bound;
+    if bound > 0.0 {
+        match cone {
+            FrictionCone::Pyramid => {
+                for i in 1..3 {
+                    if y[i].abs() < bound {
+                        s[i][i] = t;
+                    }
+                }
+            }
+            FrictionCone::Disc => {
+                let length = (y[1] * y[1] + y[2] * y[2]).sqrt();
+                if length <= bound {
+                    (s[1][1], s[2][2]) = (t, t);
+                } else {
+                    // Slipping resists only a turn of the direction: the rank-one block across it.
+                    let r = t * bound / length;
+                    let across = [-y[2] / length, y[1] / length];
+                    let block = mat_scale(
+                        r,
+                        &[
+                            [0.0; 3],
+                            [0.0, across[0] * across[0], across[0] * across[1]],
+                            [0.0, across[1] * across[0], across[1] * across[1]],
+                        ],
+                    );
+                    s = mat_add(&s, &block);
+                }
+            }
+        }
+    }
+    (s != [[0.0; 3]; 3]).then_some(s)
+}

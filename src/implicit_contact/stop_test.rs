@@ -1,0 +1,112 @@
+//! When to stop: meaningful residuals first, then the estimated velocity error; and the best iterate seen.
+
+use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work, velocity_error};
+
+/// Growth of the merit over the best seen that counts as divergence.
+const GROWTH: f64 = 1e3;
+
+/// How a run of a solver ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ending {
+    /// Tolerances met.
+    Converged,
+    /// The residual no longer falls: time for another solver.
+    Stagnated,
+    /// Work cap.
+    Exhausted,
+}
+
+/// What a run of a solver reports.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    /// Iterations made.
+    pub iterations: u32,
+    /// How it ended.
+    pub ending: Ending,
+}
+
+/// What to do after a check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Verdict {
+    /// Tolerances met by the iterate just checked.
+    Converged,
+    /// Go on.
+    Continue,
+    /// The iterate is far worse than the best: under-relax and restart from that one.
+    Diverged,
+}
+
+/// The test, over the checks of one run.
+pub(super) struct StopTest {
+    best: f64,
+    /// No estimate before this iteration.
+    wait_until: u32,
+}
+
+impl StopTest {
+    /// A test that has seen nothing.
+    pub fn new() -> StopTest {
+        StopTest { best: f64::INFINITY, wait_until: 0 }
+    }
+
+    /// Judges `now`, with its `residuals` and with `A dv`, `C^T p` in the buffers. `best` is replaced when `now` is
+    /// better. The estimate costs some iterations, so it is made only once the residuals have passed, and after one
+    /// that failed not before the iterations that a geometric fall needs.
+    pub fn check(
+        &mut self,
+        task: &Task,
+        now: &Iterate,
+        residuals: &Residuals,
+        iteration: u32,
+        best: &mut Iterate,
+        buffers: &mut MeasureBuffers,
+        work: &mut Work,
+    ) -> Verdict {
+        let (merit, settings) = (residuals.merit(), task.settings);
+        if !merit.is_finite() || merit > GROWTH * self.best {
+            return Verdict::Diverged;
+        }
+        if merit <= self.best {
+            self.best = merit;
+            best.clone_from(now);
+        }
+        let tolerance = settings.velocity_tolerance;
+        let passed = residuals.contact() <= settings.contact_tolerance && residuals.dynamics <= tolerance;
+        if passed && iteration >= self.wait_until {
+            let error = velocity_error(task, now, residuals, buffers, work);
+            if error <= tolerance {
+                best.clone_from(now);
+                return Verdict::Converged;
+            }
+            let missing = (error / tolerance).ln().clamp(0.1, 1.0);
+            self.wait_until = iteration + (f64::from(iteration) * 0.3 * missing) as u32;
+        }
+        Verdict::Continue
+    }
+}
+
+/// Watches a residual for stagnation.
+pub(super) struct Stagnation {
+    patience: u32,
+    reference: f64,
+    since: u32,
+}
+
+impl Stagnation {
+    /// Stagnation is `patience` iterations without halving the residual.
+    pub fn new(patience: u32) -> Stagnation {
+        Stagnation { patience, reference: f64::INFINITY, since: 0 }
+    }
+
+    /// Whether the residual has stagnated at `iteration`; if so, the count begins again.
+    pub fn seen(&mut self, merit: f64, iteration: u32) -> bool {
+        if merit <= 0.5 * self.reference {
+            self.reference = merit;
+            self.since = iteration;
+        } else if iteration - self.since >= self.patience {
+            self.since = iteration;
+            return true;
+        }
+        false
+    }
+}
