@@ -4,12 +4,14 @@
 //! * `brute_force`: every pair tested; the oracle of the other structures
 //! * `ownership`, `bvh`, `pair_lists`, `broad_phase`: the same candidates by a tree of boxes
 //! * `proximity`: near pairs at a state, with weights, normals and distances
+//! * `intersection`: the certificate, edges against faces by exact predicates
 //! * `ccd`: continuous detection of one pair
 
 mod broad_phase;
 pub mod brute_force;
 mod bvh;
 pub mod ccd;
+pub mod intersection;
 mod ownership;
 mod pair_lists;
 mod primitives;

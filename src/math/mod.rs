@@ -2,10 +2,11 @@
 //!
 //! * `simd`: several numbers at once, with the same bits on every processor
 //! * `vector`: three-vectors and 3x3 matrices as plain arrays
-//! * `simd`: several numbers at once, with the same bits on every processor
+//! * `predicates`: exact signs of determinants
 //! * `integer_polynomial`: exact roots and signs, for the rare cases that floating point leaves open
 
 mod integer_polynomial;
+pub mod predicates;
 pub mod simd;
 mod vector;
 pub(crate) use integer_polynomial::decompose;

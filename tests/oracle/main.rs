@@ -4,5 +4,6 @@ mod broad_phase;
 mod ccd_distance;
 mod ccd_separation;
 mod distance;
+mod intersection;
 mod random;
 mod scenes;

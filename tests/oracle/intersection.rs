@@ -1,0 +1,205 @@
+//! The certificate's predicate against rational arithmetic by another route, and its search against brute force.
+
+use crate::random::Random;
+use crate::scenes::{Scene, scenes};
+use num_rational::BigRational as Q;
+use num_traits::{One, Signed, Zero};
+use signorini::detection::intersection::{below_half_space, find, find_brute_force};
+use signorini::geometry::point_triangle;
+use signorini::math::predicates::{orient2d, orient3d, plane_side, segment_meets_triangle};
+use signorini::math::{Vec3, add_scaled, scale};
+use signorini::parallel::{Par, Pool};
+
+type Q3 = [Q; 3];
+
+fn exact(v: Vec3) -> Q3 {
+    v.map(|x| Q::from_float(x).unwrap())
+}
+
+fn sub(a: &Q3, b: &Q3) -> Q3 {
+    [0, 1, 2].map(|k| &a[k] - &b[k])
+}
+
+/// Whether numbers `u` in a polygon of half-planes exist: the system `A u <= b` in three unknowns, by Fourier-Motzkin
+/// elimination. Knows nothing of orientations or special cases.
+fn feasible(mut rows: Vec<(Vec<Q>, Q)>, unknowns: usize) -> bool {
+    for k in 0..unknowns {
+        let (mut upper, mut lower, mut rest) = (vec![], vec![], vec![]);
+        for (a, b) in rows {
+            if a[k].is_zero() {
+                rest.push((a, b));
+            } else {
+                let f = Q::one() / a[k].abs();
+                let row = (a.iter().map(|x| x * &f).collect::<Vec<Q>>(), &b * &f);
+                if row.0[k].is_positive() { upper.push(row) } else { lower.push(row) }
+            }
+        }
+        for (a, b) in &upper {
+            for (c, d) in &lower {
+                rest.push((a.iter().zip(c).map(|(x, y)| x + y).collect(), b + d));
+            }
+        }
+        rest.sort();
+        rest.dedup();
+        rows = rest;
+    }
+    rows.iter().all(|(_, b)| !b.is_negative())
+}
+
+/// Whether `t` in [0, 1] and weights `u, v >= 0`, `u + v <= 1` with `p + t (q - p) = a + u (b - a) + v (c - a)` exist.
+fn meets(x: &[Vec3; 5]) -> bool {
+    let [p, q, a, b, c] = x.map(exact);
+    let (d, e, f, r) = (sub(&q, &p), sub(&b, &a), sub(&c, &a), sub(&a, &p));
+    let number = |n: i32| Q::from_integer(n.into());
+    let mut rows = vec![
+        (vec![number(-1), number(0), number(0)], number(0)),
+        (vec![number(1), number(0), number(0)], number(1)),
+        (vec![number(0), number(-1), number(0)], number(0)),
+        (vec![number(0), number(0), number(-1)], number(0)),
+        (vec![number(0), number(1), number(1)], number(1)),
+    ];
+    for k in 0..3 {
+        let row = vec![d[k].clone(), -&e[k], -&f[k]];
+        rows.push((row.iter().map(|x| -x).collect(), -&r[k]));
+        rows.push((row, r[k].clone()));
+    }
+    feasible(rows, 3)
+}
+
+fn check(x: &[Vec3; 5]) -> bool {
+    let expected = meets(x);
+    for [p, q, a, b, c] in [*x, [x[1], x[0], x[3], x[4], x[2]], [x[0], x[1], x[3], x[2], x[4]]] {
+        assert_eq!(segment_meets_triangle(p, q, a, b, c), expected, "{x:?}");
+    }
+    expected
+}
+
+#[test]
+fn segments_and_triangles_on_lattices_and_at_random() {
+    let mut r = Random::new(20);
+    let (mut hits, mut queries) = (0, 0);
+    for size in [2, 3, 4, 9] {
+        for _ in 0..80 {
+            hits += usize::from(check(&[0; 5].map(|_| [0; 3].map(|_| r.pick(size) as f64 - 1.0))));
+            // All in one plane.
+            hits += usize::from(check(&[0; 5].map(|_| [r.pick(size) as f64, r.pick(size) as f64, 1.0])));
+            // All on one line.
+            hits += usize::from(check(&[0; 5].map(|_| scale(r.pick(size + 3) as f64, [1.0, -0.5, 2.0]))));
+            queries += 3;
+        }
+    }
+    for _ in 0..300 {
+        hits += usize::from(check(&[0; 5].map(|_| r.vector())));
+        queries += 1;
+    }
+    assert!(hits > queries / 8 && hits < queries * 7 / 8, "{hits} of {queries}");
+}
+
+#[test]
+fn segments_that_end_beside_triangles_by_one_bit() {
+    let mut r = Random::new(21);
+    let mut hits = 0;
+    for _ in 0..300 {
+        let far = scale([0.0, 1.0, 1e6][r.pick(3)], r.vector());
+        let [a, b, c] = [0; 3].map(|_| add_scaled(far, 1.0, r.vector()));
+        // A point on the triangle, its edge or its corner, rounded.
+        let (u, v) = ([0.0, r.unit(), 0.5][r.pick(3)], [0.0, 0.25][r.pick(2)]);
+        let on = add_scaled(add_scaled(a, u, signorini::math::sub(b, a)), v, signorini::math::sub(c, a));
+        let p = [0, 1, 2].map(|k| [on[k], on[k].next_up(), on[k].next_down()][r.pick(3)]);
+        let q = add_scaled(p, [0.0, 1.0, 1e-9][r.pick(3)], r.vector());
+        hits += usize::from(check(&[p, q, a, b, c]));
+    }
+    assert!(hits > 10 && hits < 290, "{hits}");
+}
+
+#[test]
+fn sizes_beyond_the_range_of_expansions() {
+    let mut r = Random::new(22);
+    for _ in 0..10 {
+        for exponent in [-320, -300, -200, -90, -76, 90, 91, 150, 300] {
+            let size = 10_f64.powi(exponent);
+            check(&[0; 5].map(|_| [0; 3].map(|_| (r.pick(4) as f64 - 1.0) * size)));
+            // Sizes mixed within one query.
+            check(&[0; 5].map(|_| [0; 3].map(|_| (r.pick(3) as f64 - 1.0) * [1.0, size][r.pick(2)])));
+        }
+    }
+}
+
+#[test]
+fn signs_of_determinants() {
+    let mut r = Random::new(23);
+    let sign = |q: &Q| i32::from(q.is_positive()) - i32::from(q.is_negative());
+    for _ in 0..2000 {
+        let size = if r.pick(2) == 0 { 1.0 } else { r.power(-300.0, 300.0) };
+        let mut coordinate = || match r.pick(3) {
+            0 => r.pick(3) as f64 * size,
+            1 => (0.5 + r.pick(4) as f64 * f64::EPSILON) * size,
+            _ => r.between(-1.0, 1.0),
+        };
+        let x = [0; 4].map(|_| [0; 3].map(|_| coordinate()));
+        let q = x.map(exact);
+        let (u, v, w) = (sub(&q[1], &q[0]), sub(&q[2], &q[0]), sub(&q[3], &q[0]));
+        let cross = |i: usize, j: usize| &u[i] * &v[j] - &u[j] * &v[i];
+        let volume = cross(1, 2) * &w[0] + cross(2, 0) * &w[1] + cross(0, 1) * &w[2];
+        assert_eq!(orient3d(x[0], x[1], x[2], x[3]), sign(&volume), "{x:?}");
+        let [a, b, c, _] = x.map(|v| [v[0], v[1]]);
+        assert_eq!(orient2d(a, b, c), sign(&cross(0, 1)), "{x:?}");
+        let offset = [x[2][0], signorini::math::dot(x[0], x[1])][r.pick(2)];
+        if offset.is_finite() {
+            let side = &q[0][0] * &q[1][0] + &q[0][1] * &q[1][1] + &q[0][2] * &q[1][2] - Q::from_float(offset).unwrap();
+            assert_eq!(plane_side(x[0], offset, x[1]), sign(&side), "{x:?} {offset}");
+        }
+    }
+}
+
+#[test]
+fn whole_states_agree_with_brute_force_and_have_points() {
+    let pool = Pool::new(2).unwrap();
+    let mut total = 0;
+    for scene in scenes() {
+        let p = scene.primitives();
+        for x in [&scene.x0, &scene.x1] {
+            let between = |a: u32, b: u32| scene.body[a as usize] != scene.body[b as usize];
+            let expected = find_brute_force(&p, x, &between);
+            assert_eq!(find(&p, x, &between, Par::Serial), expected, "{}", scene.name);
+            let expected = find_brute_force(&p, x, &|_, _| true);
+            assert_eq!(find(&p, x, &|_, _| true, Par::Pool(&pool)), expected, "{}", scene.name);
+            total += expected.len();
+            points_are_common(&scene, x, &expected);
+        }
+    }
+    assert!(total > 1000, "{total}");
+}
+
+fn points_are_common(scene: &Scene, x: &[Vec3], found: &[signorini::detection::intersection::Intersection]) {
+    for i in found {
+        let [a, b, c] = scene.faces[i.face as usize].map(|v| x[v as usize]);
+        let [p, q] = scene.edges[i.edge as usize].map(|v| x[v as usize]);
+        let size = [a, b, c, p, q].iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let separation = point_triangle::closest_points(i.point, a, b, c).separation;
+        let distance = separation.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        assert!(distance <= 1e-13 * size, "{}: {i:?} is {distance:e} away", scene.name);
+    }
+}
+
+#[test]
+fn vertices_below_a_half_space() {
+    let x = [[0.0, 0.0, 1.0], [3.0, 2.0, 0.5], [1.0, 1.0, 0.5_f64.next_down()], [0.0, 0.0, -2.0]];
+    let below = below_half_space(&[0, 1, 2, 3], &x, [0.0, 0.0, 1.0], 0.5);
+    assert_eq!(below.iter().map(|b| b.0).collect::<Vec<_>>(), [2, 3]);
+    assert_eq!(below[1].1, [0.0, 0.0, 0.5]);
+}
+
+#[test]
+fn a_fold_that_crosses_its_neighbour_is_found() {
+    // Faces 0 1 2 and 0 3 4 share vertex 0; edge 3 4 passes through the first.
+    let mut x = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.3, 0.3, -0.5], [0.3, 0.3, 0.5]];
+    let faces = [[0, 1, 2], [0, 3, 4]];
+    let edges = [[0, 1], [1, 2], [0, 2], [0, 3], [3, 4], [0, 4]];
+    let p = signorini::detection::Primitives { vertices: &[0, 1, 2, 3, 4], edges: &edges, faces: &faces };
+    let found = find(&p, &x, &|_, _| true, Par::Serial);
+    assert_eq!((found.len(), found[0].edge, found[0].face), (1, 4, 0));
+    assert!(signorini::math::norm(signorini::math::sub(found[0].point, [0.3, 0.3, 0.0])) < 1e-15);
+    x[3] = [0.3, 0.3, 0.1];
+    assert!(find(&p, &x, &|_, _| true, Par::Serial).is_empty());
+}
