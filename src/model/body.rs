@@ -185,7 +185,7 @@ fn topology_hash(model: &Model) -> u64 {
 }
 
 /// A tenth of the mean edge length; 0 for surfaces without edges.
-fn default_half_thickness(surface: &Surface) -> f64 {
+pub fn default_half_thickness(surface: &Surface) -> f64 {
     if surface.edges.is_empty() {
         return 0.0;
     }

@@ -1,1 +1,78 @@
-//! Bodies by id, the step, queries.
+//! Worlds: bodies by id, what the host drives them with, the step, queries.
+//!
+//! * `ids`: value ids with generations
+//! * `error`: how a call can fail
+//! * `surface`: collision surfaces from lists of triangles, edges and points
+//! * `body`: bodies and their descriptions
+//! * `material`: materials and pair overrides
+//! * `system`: host matrices
+//! * `drive`: what is pushed before a step
+//! * `step`: the step
+//! * `query`: what is pulled after it; check, hash
+
+mod body;
+mod drive;
+mod error;
+mod ids;
+mod material;
+mod query;
+mod step;
+mod surface;
+mod system;
+
+pub use body::{BodyOptions, DeformableDescription, KinematicDescription, RigidDescription};
+pub use error::{Fault, WorldError};
+pub use query::{BodyInfo, BodyKind, Outcome};
+pub use step::StepFailure;
+pub use surface::Topology;
+pub use system::SymmetrySlack;
+
+use crate::implicit_contact::{Memory, Scratch};
+use crate::model::{ContactRecord, Drives, Material, Model, State, StepResult, Witness};
+use ids::{IdKind, Slots};
+
+/// Bodies, materials, systems and filters of a host, and what the method remembers.
+pub struct World {
+    bodies: Slots<body::Body>,
+    materials: Slots<Material>,
+    systems: Slots<system::HostSystem>,
+    /// `(material, material, friction coefficient)` by id, smaller first, sorted.
+    overrides: Vec<(u64, u64, f64)>,
+    model: Model,
+    model_current: bool,
+    state: State,
+    drives: Drives,
+    result: StepResult,
+    memory: Memory,
+    scratch: Scratch,
+    contacts: Vec<ContactRecord>,
+    witnesses: Vec<Witness>,
+}
+
+impl Default for World {
+    fn default() -> Self {
+        World::new()
+    }
+}
+
+impl World {
+    /// An empty world.
+    pub fn new() -> World {
+        let tag = ids::new_world_tag();
+        World {
+            bodies: Slots::new(tag, IdKind::Body),
+            materials: Slots::new(tag, IdKind::Material),
+            systems: Slots::new(tag, IdKind::System),
+            overrides: Vec::new(),
+            model: Model::default(),
+            model_current: false,
+            state: State::default(),
+            drives: Drives::default(),
+            result: StepResult::default(),
+            memory: Memory::default(),
+            scratch: Scratch::default(),
+            contacts: Vec::new(),
+            witnesses: Vec::new(),
+        }
+    }
+}

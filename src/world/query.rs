@@ -1,0 +1,282 @@
+//! What a host pulls: end states, results, contacts, witnesses, the hash.
+
+use super::body::Body;
+use super::{Fault, World, WorldError};
+use crate::kinematics::Pose;
+use crate::math::{Vec3, ZERO};
+use crate::model::{ContactRecord, HalfSpace, Kind, Precision, Surface, Witness};
+use std::sync::Arc;
+
+/// Kind of a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BodyKind {
+    /// Free vertices, driven by the host.
+    Deformable,
+    /// Rigid, driven by the host.
+    Rigid,
+    /// Prescribed positions.
+    KinematicMesh,
+    /// Prescribed poses.
+    KinematicPosed,
+    /// A half-space.
+    HalfSpace,
+}
+
+/// What a body consists of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyInfo {
+    /// Kind.
+    pub kind: BodyKind,
+    /// Vertices.
+    pub vertices: usize,
+    /// Edges, those of triangles included.
+    pub edges: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Entries that velocities and impulses have: one per vertex, or one for a rigid body, or none.
+    pub velocities: usize,
+    /// Half thickness in use `[m]`.
+    pub half_thickness: f64,
+    /// The host's own number.
+    pub user_key: u64,
+}
+
+/// A vector of a step's outcome, per vertex of a deformable body or one for a rigid body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// `(x1 - x0)/dt` `[m/s]`
+    Velocity,
+    /// Velocity of the last part of a divided step `[m/s]`.
+    EndVelocity,
+    /// Contact impulse over the whole step `[N s]`.
+    Impulse,
+}
+
+impl World {
+    /// What a body consists of.
+    pub fn body_info(&self, id: u64) -> Result<BodyInfo, WorldError> {
+        let body = self.bodies.get(id)?;
+        let surface = &body.description.surface;
+        let (kind, velocities) = match body.description.kind {
+            Kind::Deformable { .. } => (BodyKind::Deformable, surface.rest.len()),
+            Kind::Rigid { .. } => (BodyKind::Rigid, 1),
+            Kind::Kinematic { posed: true } => (BodyKind::KinematicPosed, 0),
+            Kind::Kinematic { posed: false } => (BodyKind::KinematicMesh, 0),
+            Kind::HalfSpace(_) => (BodyKind::HalfSpace, 0),
+        };
+        let default = || crate::model::default_half_thickness(surface);
+        Ok(BodyInfo {
+            kind,
+            vertices: surface.rest.len(),
+            edges: surface.edges.len(),
+            triangles: surface.faces.len(),
+            velocities,
+            half_thickness: body.description.half_thickness.unwrap_or_else(default),
+            user_key: body.user_key,
+        })
+    }
+
+    /// Number format in which the host takes the end state of a body.
+    pub fn precision(&self, id: u64) -> Result<Precision, WorldError> {
+        Ok(self.bodies.get(id)?.description.precision)
+    }
+
+    /// Collision surface of a body.
+    pub fn surface(&self, id: u64) -> Result<Arc<Surface>, WorldError> {
+        Ok(self.bodies.get(id)?.description.surface.clone())
+    }
+
+    /// Positions of the vertices: certified after a step, as pushed before it.
+    pub fn positions(&self, id: u64) -> Result<&[Vec3], WorldError> {
+        Ok(&self.bodies.get(id)?.positions)
+    }
+
+    /// Pose of a rigid or posed kinematic body.
+    pub fn pose(&self, id: u64) -> Result<Pose, WorldError> {
+        let body = self.bodies.get(id)?;
+        if body.posed() { Ok(body.pose) } else { Err(without("pose", id)) }
+    }
+
+    /// Plane of a half-space.
+    pub fn half_space(&self, id: u64) -> Result<HalfSpace, WorldError> {
+        let body = self.bodies.get(id)?;
+        match body.description.kind {
+            Kind::HalfSpace(_) => Ok(body.half_space),
+            _ => Err(without("plane", id)),
+        }
+    }
+
+    /// Outcome of the last step, linear; zero before the first.
+    pub fn outcome(&self, id: u64, outcome: Outcome) -> Result<Vec<Vec3>, WorldError> {
+        let body = self.bodies.get(id)?;
+        let count = self.body_info(id)?.velocities;
+        if count == 0 {
+            return Err(without("velocities and impulses", id));
+        }
+        let blocks = body.outcome(outcome);
+        Ok(if blocks.is_empty() { vec![ZERO; count] } else { blocks[..count].to_vec() })
+    }
+
+    /// Outcome of the last step of a rigid body, angular, about its centre of mass; zero before the first.
+    pub fn angular_outcome(&self, id: u64, outcome: Outcome) -> Result<Vec3, WorldError> {
+        let body = self.bodies.get(id)?;
+        match body.description.kind {
+            Kind::Rigid { .. } => Ok(body.outcome(outcome).get(1).copied().unwrap_or(ZERO)),
+            _ => Err(without("angular velocity and impulse", id)),
+        }
+    }
+
+    /// Contacts of the last step in stable order; bodies by key, see [`World::id_of_key`].
+    pub fn contacts(&self) -> &[ContactRecord] {
+        &self.contacts
+    }
+
+    /// Witnesses of the last check, or of the last step that was refused or pinched.
+    pub fn witnesses(&self) -> &[Witness] {
+        &self.witnesses
+    }
+
+    /// Number of intersections of the present state; their witnesses are kept.
+    pub fn check(&mut self, _par: crate::parallel::Par) -> Result<usize, WorldError> {
+        self.build_model()?;
+        self.gather_state();
+        Err(WorldError::new(Fault::Unsupported, "the check is not there yet"))
+    }
+
+    /// Id of the body that a contact or witness names by its key.
+    pub fn id_of_key(&self, key: u64) -> u64 {
+        self.bodies.id_of_key(key)
+    }
+
+    /// A 64-bit hash over everything that the host has pushed and the last step has left; equal bits, equal hash.
+    /// Ids enter without the world's tag, so that two worlds with the same history have the same hash. Cost: linear.
+    pub fn state_hash(&self) -> u64 {
+        let mut hash = Hash::new();
+        for (id, body) in self.bodies.iter() {
+            hash.word(super::ids::key(id));
+            body.hash(&mut hash);
+        }
+        for (id, material) in self.materials.iter() {
+            hash.word(super::ids::key(id));
+            hash.number(material.friction_coefficient);
+            hash.word(material.combine_rule as u64);
+        }
+        for (a, b, friction) in &self.overrides {
+            hash.word(super::ids::key(*a));
+            hash.word(super::ids::key(*b));
+            hash.number(*friction);
+        }
+        for (id, system) in self.systems.iter() {
+            hash.word(super::ids::key(id));
+            system.bodies.iter().for_each(|body| hash.word(super::ids::key(*body)));
+            system.columns.iter().for_each(|column| hash.word(u64::from(*column)));
+            system.values.iter().flatten().for_each(|row| hash.vector(*row));
+        }
+        for contact in &self.contacts {
+            hash.word(contact.key);
+            hash.number(contact.distance);
+            hash.vector(contact.impulse);
+        }
+        hash.value
+    }
+}
+
+impl Body {
+    fn outcome(&self, outcome: Outcome) -> &[Vec3] {
+        match outcome {
+            Outcome::Velocity => &self.result_velocities,
+            Outcome::EndVelocity => &self.result_end_velocities,
+            Outcome::Impulse => &self.result_impulses,
+        }
+    }
+
+    fn hash(&self, hash: &mut Hash) {
+        let d = &self.description;
+        for word in [d.groups, d.mask, d.self_collision as u64, d.precision as u64, super::ids::key(self.material)] {
+            hash.word(word);
+        }
+        hash.number(d.half_thickness.unwrap_or(-1.0));
+        match &d.kind {
+            Kind::Deformable { masses, pinned } => {
+                masses.iter().for_each(|mass| hash.number(*mass));
+                pinned.iter().for_each(|pinned| hash.word(u64::from(*pinned)));
+            }
+            Kind::Rigid { mass, inertia } => {
+                hash.number(*mass);
+                inertia.iter().for_each(|row| hash.vector(*row));
+            }
+            Kind::Kinematic { posed } => hash.word(u64::from(*posed)),
+            Kind::HalfSpace(_) => hash.half_space(&self.half_space),
+        }
+        let certified = self.certified.as_ref();
+        for list in [
+            &self.positions,
+            &self.velocities,
+            &self.result_velocities,
+            &self.result_end_velocities,
+            &self.result_impulses,
+        ] {
+            hash.vectors(list);
+        }
+        hash.pose(&self.pose);
+        hash.word(u64::from(self.stepped));
+        hash.word(u64::from(certified.is_some()));
+        if let Some(certified) = certified {
+            hash.vectors(&certified.positions);
+            hash.pose(&certified.pose);
+            hash.half_space(&certified.half_space);
+        }
+        if let Some(targets) = &self.target_positions {
+            hash.vectors(targets);
+        }
+        if let Some(pose) = &self.target_pose {
+            hash.pose(pose);
+        }
+        if let Some(plane) = &self.target_half_space {
+            hash.half_space(plane);
+        }
+    }
+}
+
+fn without(what: &str, id: u64) -> WorldError {
+    WorldError::new(Fault::Unsupported, format!("this kind of body has no {what}")).object(id)
+}
+
+/// A multiply-and-rotate hash over 64-bit words. Not for adversaries.
+struct Hash {
+    value: u64,
+}
+
+impl Hash {
+    fn new() -> Hash {
+        Hash { value: 0x243f_6a88_85a3_08d3 }
+    }
+
+    fn word(&mut self, word: u64) {
+        self.value = (self.value ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.value ^= self.value >> 29;
+    }
+
+    fn number(&mut self, x: f64) {
+        self.word(x.to_bits());
+    }
+
+    fn vector(&mut self, v: Vec3) {
+        v.iter().for_each(|x| self.number(*x));
+    }
+
+    fn vectors(&mut self, list: &[Vec3]) {
+        self.word(list.len() as u64);
+        list.iter().for_each(|v| self.vector(*v));
+    }
+
+    fn pose(&mut self, pose: &Pose) {
+        self.vector(pose.position);
+        pose.orientation.iter().for_each(|x| self.number(*x));
+    }
+
+    fn half_space(&mut self, plane: &HalfSpace) {
+        self.vector(plane.normal);
+        self.number(plane.offset);
+    }
+}

@@ -1,0 +1,201 @@
+//! The step of a world: build the model if something changed, gather, advance, scatter.
+
+use super::body::Body;
+use super::{Fault, World, WorldError};
+use crate::implicit_contact::advance;
+use crate::math::ZERO;
+use crate::model::{BodyDescription, BuildError, Model, Settings, State, StepError, StepReport, System};
+use crate::parallel::Par;
+
+/// A step that failed. When pinched, the world stands at the certified fraction and the report says how far.
+#[derive(Clone, Debug)]
+pub struct StepFailure {
+    /// Why.
+    pub error: WorldError,
+    /// What was done up to the certified fraction; only when pinched.
+    pub report: Option<Box<StepReport>>,
+}
+
+impl From<WorldError> for StepFailure {
+    fn from(error: WorldError) -> Self {
+        StepFailure { error, report: None }
+    }
+}
+
+impl World {
+    /// Advances all bodies by `dt` with what has been pushed.
+    ///
+    /// On every error but `Pinched` bodies, results and contacts are as they were. Witnesses of intersections are kept
+    /// for [`World::witnesses`].
+    pub fn step(&mut self, settings: &Settings, dt: f64, par: Par) -> Result<StepReport, StepFailure> {
+        if !dt.is_finite() {
+            return Err(WorldError::new(Fault::NonFinite, "the time step is not finite").value(dt).into());
+        }
+        if dt <= 0.0 {
+            return Err(WorldError::new(Fault::InvalidArgument, "the time step is not positive").value(dt).into());
+        }
+        self.build_model()?;
+        self.gather()?;
+        self.witnesses.clear();
+        let outcome = advance(
+            &self.model,
+            &mut self.state,
+            &self.drives,
+            &mut self.memory,
+            settings,
+            dt,
+            &mut self.result,
+            &mut self.scratch,
+            par,
+        );
+        match outcome {
+            Ok(report) => {
+                self.scatter();
+                Ok(report)
+            }
+            Err(StepError::Pinched { witnesses, report }) => {
+                self.scatter();
+                self.witnesses = witnesses;
+                let message = "scripted geometry leaves no room; the state stands at the certified fraction";
+                let error = self.witnessed(WorldError::new(Fault::Pinched, message)).value(report.certified_fraction);
+                Err(StepFailure { error, report: Some(report) })
+            }
+            Err(error) => Err(self.refusal(error).into()),
+        }
+    }
+
+    /// Builds the model when bodies, materials, filters or systems have changed.
+    pub(super) fn build_model(&mut self) -> Result<(), WorldError> {
+        if self.model_current {
+            return Ok(());
+        }
+        let (materials, material_ids) = self.model_materials();
+        let describe = |body: &Body| {
+            let material = material_ids.iter().position(|id| *id == body.material).unwrap_or(0) as u32;
+            BodyDescription { material, ..body.description.clone() }
+        };
+        let bodies = self.bodies.iter().map(|(_, body)| describe(body)).collect();
+        self.model = Model::build(bodies, materials, self.model_systems())
+            .map_err(|error| self.build_failure(Fault::InvalidArgument, &error))?;
+        self.model_current = true;
+        Ok(())
+    }
+
+    /// Writes the start state and the drives of every body into the arrays of the model.
+    fn gather(&mut self) -> Result<(), WorldError> {
+        self.gather_state();
+        let drives = &mut self.drives;
+        drives.velocities.clear();
+        drives.velocities.resize(self.model.block_count, ZERO);
+        drives.target_positions.clone_from(&self.state.positions);
+        drives.target_poses.clone_from(&self.state.poses);
+        drives.target_half_spaces.clone_from(&self.state.half_spaces);
+        for (index, body) in self.model.bodies.iter().enumerate() {
+            let kept = self.bodies.get(self.bodies.id_of_key(body.description.key))?;
+            drives.velocities[body.blocks.clone()].copy_from_slice(&kept.velocities);
+            if let Some(targets) = &kept.target_positions {
+                drives.target_positions[body.vertices.clone()].copy_from_slice(targets);
+            }
+            if let Some(pose) = kept.target_pose {
+                drives.target_poses[index] = pose;
+            }
+            if let Some(plane) = kept.target_half_space {
+                drives.target_half_spaces[index] = plane;
+            }
+        }
+        drives.systems.clear();
+        let patterns = self.model.systems.iter();
+        for ((id, system), description) in self.systems.iter().zip(patterns) {
+            if system.values.is_empty() {
+                let message = "a system has no values: push them before the step";
+                return Err(WorldError::new(Fault::InvalidArgument, message).object(id));
+            }
+            drives.systems.push(System { description: description.clone(), values: system.values.clone() });
+        }
+        Ok(())
+    }
+
+    /// Writes the start state of every body into the arrays of the model.
+    pub(super) fn gather_state(&mut self) {
+        self.state = self.model.rest_state();
+        for (index, body) in self.model.bodies.iter().enumerate() {
+            let id = self.bodies.id_of_key(body.description.key);
+            if let Ok(kept) = self.bodies.get(id) {
+                place(kept, index, body.vertices.clone(), &mut self.state);
+            }
+        }
+    }
+
+    /// Takes the end state and the results back to the bodies.
+    fn scatter(&mut self) {
+        for (index, body) in self.model.bodies.iter().enumerate() {
+            let id = self.bodies.id_of_key(body.description.key);
+            let Ok(kept) = self.bodies.get_mut(id) else { continue };
+            if !kept.positions.is_empty() {
+                kept.positions.copy_from_slice(&self.state.positions[body.vertices.clone()]);
+            }
+            kept.pose = self.state.poses[index];
+            kept.half_space = self.state.half_spaces[index];
+            kept.stepped = true;
+            kept.certified = None;
+            kept.target_positions = None;
+            kept.target_pose = None;
+            kept.target_half_space = None;
+            for (kept, all) in [
+                (&mut kept.result_velocities, &self.result.velocities),
+                (&mut kept.result_end_velocities, &self.result.end_velocities),
+                (&mut kept.result_impulses, &self.result.impulses),
+            ] {
+                kept.clear();
+                kept.extend_from_slice(all.get(body.blocks.clone()).unwrap_or_default());
+            }
+        }
+        self.contacts.clone_from(&self.result.contacts);
+    }
+
+    fn build_failure(&self, fault: Fault, error: &BuildError) -> WorldError {
+        let object = if error.body == 0 { 0 } else { self.bodies.id_of_key(error.body) };
+        WorldError::new(fault, error.message).object(object).index(error.index).value(error.value)
+    }
+
+    /// The failure of a step that left everything as it was.
+    fn refusal(&mut self, error: StepError) -> WorldError {
+        match error {
+            StepError::IntersectingStart(witnesses) => {
+                self.witnesses = witnesses;
+                self.witnessed(WorldError::new(Fault::IntersectingStart, "the start state intersects"))
+            }
+            StepError::SingularSystem { system, row } => {
+                let id = self.systems.iter().nth(system).map_or(0, |(id, _)| id);
+                let message = format!("the matrix is not positive definite at block row {row}");
+                WorldError::new(Fault::SingularSystem, message).object(id).index(row)
+            }
+            StepError::BadInput(error) => self.build_failure(Fault::InvalidArgument, &error),
+            StepError::Cancelled => WorldError::new(Fault::Cancelled, "cancelled"),
+            StepError::Pinched { report, .. } => {
+                WorldError::new(Fault::Pinched, "pinched").value(report.certified_fraction)
+            }
+        }
+    }
+
+    /// Names the first witness in the error.
+    pub(super) fn witnessed(&self, mut error: WorldError) -> WorldError {
+        if let Some(witness) = self.witnesses.first() {
+            let [a, b] = witness.bodies.map(|key| self.bodies.id_of_key(key));
+            let [i, j] = witness.features;
+            let count = self.witnesses.len();
+            error.message +=
+                &format!(" ({count} pairs; the first: feature {i} of body {a:#x} and feature {j} of body {b:#x})");
+            error = error.object(a).index(i as usize);
+        }
+        error
+    }
+}
+
+fn place(kept: &Body, index: usize, vertices: std::ops::Range<usize>, state: &mut State) {
+    if !vertices.is_empty() {
+        state.positions[vertices].copy_from_slice(&kept.positions);
+    }
+    state.poses[index] = kept.pose;
+    state.half_spaces[index] = kept.half_space;
+}
