@@ -1,6 +1,14 @@
 //! Whole scenes run through the public Rust API by a small host that owns its dynamics.
+//!
+//! Every step of every scene is checked: no intersection by exact predicates, no energy from contact, momentum only
+//! where impulses say so. Long versions run when `SIGNORINI_ALL=1` is set.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[allow(dead_code)]
+#[allow(dead_code, unused_imports)]
 #[path = "../../benches/support/mod.rs"]
 mod support;
+
+mod invariants;
+
+mod cloth;
+mod solids;
