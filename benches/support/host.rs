@@ -71,7 +71,8 @@ pub struct Facts {
     pub energy_gain: f64,
     /// `|v*|_A^2 / 2` `[J]`.
     pub energy_free: f64,
-    /// `|sum m (v - v*) - sum impulses|` over free bodies, relative to the sum of `|m (v - v*)|`.
+    /// `|sum m (v - v*) - sum impulses|` over free bodies, relative to the sum of `m |v - v*|` and
+    /// a thousandth of that of `m |v|`.
     pub momentum_error: f64,
     /// Largest speed `[m/s]`.
     pub speed: f64,
@@ -253,7 +254,8 @@ impl Host {
             let change = sub(v[b], free[b]);
             gained = add_scaled(gained, mass(b), change);
             given = add_scaled(given, 1.0, self.result.impulses[b]);
-            size += mass(b) * norm(change);
+            // A change of a thousandth of the velocity is within the default contact tolerance.
+            size += mass(b) * (norm(change) + 1e-3 * norm(v[b]));
         }
         let energy_free = self.metric_energy(linear, free);
         let kinetic = (0..n).map(|b| 0.5 * mass(b) * dot(self.velocities[b], self.velocities[b])).sum();

@@ -28,32 +28,28 @@ type World = (&'static str, fn() -> Host, usize);
 
 fn worlds() -> Vec<World> {
     vec![
-        ("crumple", || scenes::crumple(36, 0), 90),
-        ("drape", || scenes::drape(34, 0), 60),
-        ("ball", || scenes::catch_ball(16, 1.0, 1.0, 0), 60),
-        ("boxes", || scenes::boxes(1, 3, 0), 30),
+        ("crumple", || scenes::crumple(34, 0), 80),
+        ("drape", || scenes::drape(34, 0), 40),
+        ("ball", || scenes::catch_ball(12, 1.0, 1.0, 0), 40),
+        ("boxes", || scenes::boxes(1, 3, 0), 25),
     ]
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_bits() {
+fn threads_and_scratch_change_no_bit() {
+    let all = std::env::var("SIGNORINI_ALL").is_ok_and(|v| v == "1");
+    if !all {
+        println!("skipped without SIGNORINI_ALL=1: one and five threads");
+    }
+    let counts: &[usize] = if all { &[1, 2, 3, 5] } else { &[2, 3] };
     for (name, make, steps) in worlds() {
         let serial = hashes(make(), steps, Par::Serial, false);
-        for threads in [1, 2, 3, 5] {
+        let differs = |other: &[u64]| (0..steps).find(|&i| serial[i] != other[i]);
+        assert_eq!(differs(&hashes(make(), steps, Par::Serial, true)), None, "{name}: emptied scratch");
+        for &threads in counts {
             let pool = Pool::new(threads).expect("threads");
-            let pooled = hashes(make(), steps, Par::Pool(&pool), false);
-            let first = (0..steps).find(|&i| serial[i] != pooled[i]);
-            assert_eq!(first, None, "{name}: step differs on {threads} threads");
+            assert_eq!(differs(&hashes(make(), steps, Par::Pool(&pool), false)), None, "{name}: {threads} threads");
         }
-    }
-}
-
-#[test]
-fn emptied_scratch_changes_no_bit() {
-    for (name, make, steps) in worlds() {
-        let kept = hashes(make(), steps, Par::Serial, false);
-        let emptied = hashes(make(), steps, Par::Serial, true);
-        assert_eq!((0..steps).find(|&i| kept[i] != emptied[i]), None, "{name}");
     }
 }
 
