@@ -7,9 +7,10 @@
 use super::bvh::{Bvh, Frame, LEAF, MIXED, Overlap, PackedBox, item_boxes};
 use super::ownership::{Ownership, own};
 use super::pair_lists::{PairLists, merge};
-use super::primitives::{Candidates, Filter, Motion, Primitives, share_vertex};
+use super::primitives::{Candidates, Filter, Motion, Primitives};
 use crate::geometry::Aabb;
 use crate::math::{Vec3, lerp};
+use crate::mesh::share_vertex;
 use crate::parallel::Par;
 
 /// Leaves per task of a parallel traversal.

@@ -1,7 +1,8 @@
 //! Every pair tested: the definition of the candidate sets, and the oracle of [`super::BroadPhase`].
 
-use super::primitives::{Candidates, Filter, Motion, Primitives, share_vertex};
+use super::primitives::{Candidates, Filter, Motion, Primitives};
 use crate::geometry::Aabb;
+use crate::mesh::share_vertex;
 
 /// All pairs of one list of primitives with another whose boxes overlap.
 fn pairs<const N: usize, const M: usize>(

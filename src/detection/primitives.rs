@@ -56,9 +56,3 @@ pub struct Candidates {
 /// Must be symmetric, and the same for every vertex of a connected component: it is for pairs of bodies, and is asked
 /// once for many pairs.
 pub type Filter<'a> = dyn Fn(u32, u32) -> bool + Sync + 'a;
-
-/// Whether two primitives have a vertex in common: such pairs are never candidates.
-#[inline(always)]
-pub(super) fn share_vertex<const N: usize, const M: usize>(a: &[u32; N], b: &[u32; M]) -> bool {
-    a.iter().any(|v| b.contains(v))
-}

@@ -2,20 +2,8 @@
 
 use super::{BuildError, HalfSpace, Materials, SystemDescription};
 use crate::math::{Mat3, Vec3};
+use crate::mesh::Surface;
 use std::sync::Arc;
-
-/// A collision surface: vertices by index, edges and faces. Any of the three may stand alone (points, wires, meshes).
-#[derive(Clone, Debug, Default)]
-pub struct Surface {
-    /// Rest positions `[m]`; for rigid and posed bodies in the body frame about the centre of mass.
-    pub rest: Vec<Vec3>,
-    /// Vertices that take part in contact (those of an edge, a face, or points).
-    pub vertices: Vec<u32>,
-    /// Edges, smaller index first, sorted, unique; edges of faces included.
-    pub edges: Vec<[u32; 2]>,
-    /// Triangles.
-    pub faces: Vec<[u32; 3]>,
-}
 
 /// What moves a body.
 #[derive(Clone, Debug)]

@@ -18,7 +18,8 @@ mod state;
 mod system;
 mod validate;
 
-pub use body::{BlockRange, Body, BodyDescription, Kind, Model, Precision, Surface, default_half_thickness};
+pub use crate::mesh::Surface;
+pub use body::{BlockRange, Body, BodyDescription, Kind, Model, Precision, default_half_thickness};
 pub use material::{CombineRule, Material, Materials};
 pub use motion::Segment;
 pub use report::{BuildError, ContactRecord, StageTimes, StepError, StepReport, Witness};
