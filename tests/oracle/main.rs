@@ -1,6 +1,7 @@
 //! The library against independent answers: exact arithmetic, closed forms, brute force, other algorithms.
 
 mod broad_phase;
+mod ccd_batch;
 mod ccd_distance;
 mod ccd_separation;
 mod distance;

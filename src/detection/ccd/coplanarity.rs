@@ -12,8 +12,9 @@ use crate::math::simd::Lanes;
 ///
 /// Each coefficient is a mean of six monomials `e_i f_j g_k`. A monomial carries three rounded differences, two
 /// products, and at most six sums and the division by three: 12 u. Evaluation by three convex combinations adds
-/// `3 x 3 u` of the largest coefficient, at most six monomials. `6 (12 + 9) u = 126 u`.
-pub(super) const CUBIC_ERROR: f64 = 128.0 * super::motion::UNIT_ROUNDOFF;
+/// `3 x 3 u` of the largest coefficient, at most six monomials: `6 (12 + 9) u = 126 u`. The rest is for the rounding of
+/// the bound itself and of what is subtracted from the coefficients.
+pub(super) const CUBIC_ERROR: f64 = 144.0 * super::motion::UNIT_ROUNDOFF;
 
 /// Three coordinates, each for several pairs.
 pub(super) type Point<const L: usize> = [Lanes<L>; 3];
@@ -89,60 +90,88 @@ impl<const L: usize> Frame<L> {
     }
 }
 
-/// Greater than zero where one of the three axes keeps the pair apart by more than `separation` for the whole step.
+/// Greater than zero where one of the three axes keeps the pair apart by more than `separation` on `[0, t_max]`.
 ///
-/// Exact for zero separation: a difference of doubles has the sign of the exact one, and coordinates linear in time
-/// that are ordered at both ends are ordered in between.
+/// Exact for zero separation and the whole step: a difference of doubles has the sign of the exact one, and coordinates
+/// linear in time that are ordered at both ends are ordered in between.
 #[inline(always)]
-pub(super) fn axis_gap<const L: usize>(shape: Shape, x0: &[Point<L>; 4], x1: &[Point<L>; 4]) -> Lanes<L> {
+pub(super) fn axis_gap<const L: usize>(
+    shape: Shape,
+    x0: &[Point<L>; 4],
+    x1: &[Point<L>; 4],
+    separation: Lanes<L>,
+    t_max: f64,
+) -> Lanes<L> {
     let mut best = Lanes::splat(f64::NEG_INFINITY);
     for c in 0..3 {
-        let (mut above, mut below) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::INFINITY));
-        for x in [x0, x1] {
-            let (low_a, high_a, low_b, high_b) = match shape {
-                Shape::VertexFace => {
-                    (x[0][c], x[0][c], x[1][c].min(x[2][c]).min(x[3][c]), x[1][c].max(x[2][c]).max(x[3][c]))
-                }
-                Shape::EdgeEdge => {
-                    (x[0][c].min(x[1][c]), x[0][c].max(x[1][c]), x[2][c].min(x[3][c]), x[2][c].max(x[3][c]))
-                }
-            };
-            above = above.min(low_a - high_b);
-            below = below.min(low_b - high_a);
-        }
-        best = best.max(above).max(below);
+        let (above0, below0) = axis_gaps_at(shape, x0, c);
+        let (above1, below1) = axis_gaps_at(shape, x1, c);
+        best = best.max(least_gap(above0, above1, t_max)).max(least_gap(below0, below1, t_max));
     }
-    best
+    best - separation * Lanes::splat(1.0 + 4.0 * f64::EPSILON)
 }
 
-/// Greater than zero where the plane keeps the pair apart by more than `separation` for the whole step: the cubic's
+/// How far the first primitive lies above the second along an axis at one end of the step, and how far below.
+#[inline(always)]
+fn axis_gaps_at<const L: usize>(shape: Shape, x: &[Point<L>; 4], c: usize) -> (Lanes<L>, Lanes<L>) {
+    let (low_a, high_a, low_b, high_b) = match shape {
+        Shape::VertexFace => (x[0][c], x[0][c], x[1][c].min(x[2][c]).min(x[3][c]), x[1][c].max(x[2][c]).max(x[3][c])),
+        Shape::EdgeEdge => (x[0][c].min(x[1][c]), x[0][c].max(x[1][c]), x[2][c].min(x[3][c]), x[2][c].max(x[3][c])),
+    };
+    (low_a - high_b, low_b - high_a)
+}
+
+/// The least gap on `[0, t_max]`: gaps are minima of functions linear in time, so they are concave and least at an end,
+/// and at `t_max` at least what interpolation gives.
+#[inline(always)]
+fn least_gap<const L: usize>(gap0: Lanes<L>, gap1: Lanes<L>, t_max: f64) -> Lanes<L> {
+    if t_max == 1.0 {
+        return gap0.min(gap1);
+    }
+    let (s, t) = (Lanes::splat(1.0 - t_max), Lanes::splat(t_max));
+    let rounding = (gap0.abs() + gap1.abs()) * Lanes::splat(8.0 * super::motion::UNIT_ROUNDOFF);
+    gap0.min(s * gap0 + t * gap1 - rounding)
+}
+
+/// Greater than zero where the plane keeps the pair apart by more than `separation` on `[0, t_max]`: the cubic's
 /// coefficients exceed those of `separation |e x f|`, bounded by the norms of its control vectors, by the rounding
 /// error.
 #[inline(always)]
-pub(super) fn plane_gap<const L: usize>(frame: &Frame<L>, separation: Option<Lanes<L>>) -> Lanes<L> {
+pub(super) fn plane_gap<const L: usize>(frame: &Frame<L>, separation: Option<Lanes<L>>, t_max: f64) -> Lanes<L> {
     let n = frame.normals();
-    let c = frame.cubic_times_three(&n);
+    let mut above = frame.cubic_times_three(&n);
+    let mut below = above.map(Lanes::negate);
     let [me, mf, mg] = frame.sizes();
-    let product = me * mf * mg;
-    let mut bound = [Lanes::splat(3.0 * CUBIC_ERROR) * product; 4];
     if let Some(separation) = separation {
         // The computed vectors are off by 18 u (36 u the middle one) of the product of sizes, their norms and the sums
-        // below by less than 100 u more.
+        // below by less than 100 u more, their interpolation by 91 u.
         let size = |v: &Point<L>| dot(v, v).sqrt();
         let (n0, n1, n2) = (size(&n[0]), size(&n[1]), size(&n[2]));
         let slack = Lanes::splat(2.0 * CUBIC_ERROR) * me * mf;
         let three = Lanes::splat(3.0);
-        let elevated = [three * n0, n0 + n1, n1 + n2, three * n2];
-        for (b, n) in bound.iter_mut().zip(elevated) {
-            *b = *b + separation * (n + slack);
+        for (i, n) in [three * n0, n0 + n1, n1 + n2, three * n2].into_iter().enumerate() {
+            let required = separation * (n + slack);
+            above[i] = above[i] - required;
+            below[i] = below[i] - required;
         }
     }
-    let (mut above, mut below) = (c[0] - bound[0], c[0].negate() - bound[0]);
-    for i in 1..4 {
-        above = above.min(c[i] - bound[i]);
-        below = below.min(c[i].negate() - bound[i]);
+    if t_max < 1.0 {
+        above = up_to(&above, t_max);
+        below = up_to(&below, t_max);
     }
+    let least = |b: &[Lanes<L>; 4]| b[0].min(b[1]).min(b[2]).min(b[3]);
+    let product = me * mf * mg;
+    let gap = least(&above).max(least(&below)) - Lanes::splat(3.0 * CUBIC_ERROR) * product;
     // Sizes whose products leave the range of doubles decide nothing.
     let in_range = (product - Lanes::splat(1e-250)).min(Lanes::splat(1e250) - product);
-    above.max(below).min(in_range)
+    gap.min(in_range)
+}
+
+/// Bernstein coefficients on `[0, t]` from those on [0, 1].
+#[inline(always)]
+fn up_to<const L: usize>(b: &[Lanes<L>; 4], t: f64) -> [Lanes<L>; 4] {
+    let lerp = |a: Lanes<L>, b: Lanes<L>| Lanes::splat(1.0 - t) * a + Lanes::splat(t) * b;
+    let (p, q, r) = (lerp(b[0], b[1]), lerp(b[1], b[2]), lerp(b[2], b[3]));
+    let (v, w) = (lerp(p, q), lerp(q, r));
+    [b[0], p, v, lerp(v, w)]
 }

@@ -46,11 +46,11 @@ pub(super) fn time_of_impact<const N: usize, K: Kind<N>>(x0: &[Vec3; 4], x1: &[V
         return Some(0.0);
     }
     let (y0, y1) = (single(x0), single(x1));
-    if axis_gap(K::SHAPE, &y0, &y1).0[0] > 0.0 {
+    if axis_gap(K::SHAPE, &y0, &y1, Lanes([0.0]), 1.0).0[0] > 0.0 {
         return None;
     }
     let frame = Frame::new(K::SHAPE, &y0, &y1);
-    if plane_gap(&frame, None).0[0] > 0.0 {
+    if plane_gap(&frame, None, 1.0).0[0] > 0.0 {
         return None;
     }
     after_plane_test::<N, K>(x0, x1, &frame, t_max)
