@@ -26,15 +26,15 @@ static HostCloth *make_cloth(uint64_t *random)
     HostCloth *cloth;
     uint32_t i;
 
-    s.columns = s.rows = 21;
+    s.columns = s.rows = 19;
     s.origin[0] = s.origin[2] = -0.6;
     s.along[0] = s.across[2] = 1.2;
     s.mass = 0.25;
     s.stretch_stiffness = 1200.0;
     s.shear_stiffness = 400.0;
     s.bend_stiffness = 0.5;
-    s.damping_time = 0.01;
-    s.drag = 1.0;
+    s.damping_time = 0.03;
+    s.drag = 2.0;
     s.gravity[1] = -GRAVITY;
     s.linear_tolerance = 1e-9;
     cloth = host_cloth_create(&s);

@@ -23,7 +23,7 @@ namespace {
 
 const double DT = 1.0 / 120.0, GRAVITY = 9.81;
 const double SPOT_MASS = 2.5, SPOT_SIZE = 0.6;
-const double RELEASE_TIME = 0.62;     // the pins let go
+const double RELEASE_TIME = 0.34;     // the pins let go
 const int STEPS = 192, PICTURES = 6;  // 1.6 s; pictures on the sheet
 const double HALF_THICKNESS = 0.003;
 
@@ -167,8 +167,8 @@ int run(const Options &options)
     btConvexHullShape hull(spot.vertices.data(), static_cast<int>(spot.vertices.size() / 3), 3 * sizeof(double));
     btRigidBody body(btRigidBody::btRigidBodyConstructionInfo(SPOT_MASS, nullptr, &hull, spot.inertia));
     const btMatrix3x3 facing(btQuaternion(btVector3(0, 1, 0), 0.35)); // Spot looks along z, a little aside
-    body.setCenterOfMassTransform(btTransform(facing * spot.axes, btVector3(0.05, 1.15, -1.5)));
-    body.setLinearVelocity(btVector3(0.1, 2.0, 6.0));
+    body.setCenterOfMassTransform(btTransform(facing * spot.axes, btVector3(0.05, 1.1, -1.5)));
+    body.setLinearVelocity(btVector3(0.1, 2.4, 6.0));
     body.setAngularVelocity(btVector3(1.5, 0.8, 0.6));
     bullet.world.addRigidBody(&body, GROUP_RIGID, btBroadphaseProxy::AllFilter);
 

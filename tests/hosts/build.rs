@@ -3,6 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// The C files that hosts share; the last one is ODE's.
+const SHARED_SOURCES: [&str; 6] = [
+    "c/host_cloth.c",
+    "c/host_mesh.c",
+    "c/signorini_host.c",
+    "c/cloth_contact.c",
+    "c/example_run.c",
+    "c/ode_contact.c",
+];
+
 /// The engine that a host belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Engine {
@@ -37,8 +47,8 @@ impl Engine {
     /// The example files in C that its hosts share.
     fn shared_sources(self) -> &'static [&'static str] {
         match self {
-            Engine::Bullet => &["c/host_cloth.c", "c/host_mesh.c", "c/cloth_contact.c"],
-            Engine::Ode => &["c/host_cloth.c", "c/host_mesh.c", "c/cloth_contact.c", "c/ode_contact.c"],
+            Engine::Bullet => &SHARED_SOURCES[..SHARED_SOURCES.len() - 1],
+            Engine::Ode => &SHARED_SOURCES,
         }
     }
 }
@@ -89,10 +99,16 @@ impl Program {
             objects.push(object);
         }
 
+        // Programs ask for the library by its soname; a link beside them bears it.
+        let soname = soname(&library.join("libsignorini.so"));
+        let link_name = folder.join(&soname);
+        let _ = std::fs::remove_file(&link_name);
+        std::os::unix::fs::symlink(library.join("libsignorini.so"), &link_name).expect("a link to the library");
+
         let program = folder.join(&name);
         let mut link = compiler(is_cpp(&examples.join(self.main)));
         link.args(objects).arg("-o").arg(&program);
-        link.arg("-L").arg(&library).arg("-lsignorini").arg(format!("-Wl,-rpath,{}", library.display()));
+        link.arg("-L").arg(&library).arg("-lsignorini").arg("-Wl,-rpath,$ORIGIN");
         link.args(self.engine.flags("--libs")).arg("-lm");
         succeed(link);
         program
@@ -105,6 +121,15 @@ fn library_folder() -> PathBuf {
     let folder = test.parent().expect("a folder").to_owned();
     assert!(folder.join("libsignorini.so").exists(), "no libsignorini.so in {}", folder.display());
     folder
+}
+
+/// The name that a shared library wants to be found by.
+fn soname(library: &Path) -> String {
+    let output = Command::new("readelf").arg("-d").arg(library).output();
+    let output = output.unwrap_or_else(|e| panic!("readelf: {e}; install the package binutils"));
+    let text = String::from_utf8_lossy(&output.stdout);
+    let name = text.lines().find_map(|line| line.split_once("soname: [")?.1.split(']').next());
+    name.unwrap_or_else(|| panic!("{} has no soname", library.display())).to_owned()
 }
 
 fn is_cpp(source: &Path) -> bool {
