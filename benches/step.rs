@@ -1,10 +1,10 @@
 //! Whole steps of whole scenes: what they cost, what they did, and how far the velocities are from a tight solve.
 //!
-//! `cargo bench --bench step -- [SCENE...] [steps=N] [seed=S] [threads=T] [tight=N] [frames=DIR] [trace]`
+//! `cargo bench --bench step -- [SCENE...] [steps=N] [seed=S] [threads=T] [tight=N] [frames=DIR] [record=STEP,STEP:DIR] [range=M] [trace]`
 //!
 //! Scenes: drape, crumple, pile, cube, ball, boxes. `tight=N` solves every Nth step again to a tolerance far below the
-//! default and compares; `frames=DIR` writes the elastic vertices of every tenth step as `f64`; `trace` prints a line per
-//! step. Times are processor seconds of the calling thread, so give threads=0 (serial, the default) for figures.
+//! default and compares; `frames=DIR` writes the elastic vertices of every tenth step as `f64`; `record=` writes the contact problems
+//! before those steps, pairs nearer than `range` (0.004); `trace` prints a line per step. Times are processor seconds of the calling thread, so give threads=0 (serial, the default) for figures.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 #[allow(dead_code, unused_imports)]
@@ -22,6 +22,8 @@ struct Choice {
     threads: usize,
     tight: usize,
     frames: Option<String>,
+    record: Option<(Vec<usize>, String)>,
+    range: f64,
     trace: bool,
     vertices: usize,
 }
@@ -37,6 +39,11 @@ fn main() {
         threads: number("threads").unwrap_or(0),
         tight: number("tight").unwrap_or(0),
         frames: value("frames"),
+        record: value("record").map(|text| {
+            let (steps, folder) = text.split_once(':').expect("record=STEP,STEP:FOLDER");
+            (steps.split(',').map(|s| s.parse().expect("a step")).collect(), folder.to_string())
+        }),
+        range: value("range").map_or(0.004, |v| v.parse().expect("a length")),
         trace: words.iter().any(|w| w == "trace"),
         vertices: number("n").unwrap_or(50),
     };
@@ -46,7 +53,7 @@ fn main() {
     }
     println!(
         "scene | steps | contacts max | active max | rounds 0-1/2/3/4-5/more | divided | zones | held | iterations \
-         median/p95/max | not converged | ms median/p95/max | host ms | intersections | energy gain | momentum | \
+         median/p95/max | not converged | ms median/p95/max | host ms | intersections | energy gain | momentum | balance | \
          velocity error median/max"
     );
     for name in names {
@@ -74,6 +81,14 @@ fn run(name: &str, choice: &Choice) {
     for number in 0..choice.steps.unwrap_or(usual) {
         if choice.tight > 0 && number % choice.tight == 0 {
             errors.extend(velocity_error(&mut host, par));
+        }
+        if let Some((steps, folder)) = &choice.record
+            && steps.contains(&number)
+        {
+            let path = format!("{folder}/{name}_{number}.bin");
+            let problem = support::record::problem(&mut host, choice.range);
+            problem.save(std::path::Path::new(&path)).expect("a writable file");
+            println!("{path}: {} contacts", problem.rows.len());
         }
         match host.step(par) {
             Ok(facts) => {
@@ -133,7 +148,7 @@ fn trace(number: usize, f: &Facts) {
     println!(
         "{number}: {:.1} ms (search {:.1} rows {:.1} solve {:.1} detection {:.1} fail-safe {:.1} certificate {:.1}), \
          contacts {} active {} rounds {} parts {} iterations {}{} zones {} held {} residuals {:.1e} {:.1e} {:.1e}, \
-         speed {:.2} kinetic {:.2e} gain {:.1e} momentum {:.0e} recovery {:.1e} intersections {:?}",
+         speed {:.2} kinetic {:.2e} gain {:.1e} momentum {:.0e} balance {:.0e} recovery {:.1e} intersections {:?}",
         1e3 * f.seconds,
         1e-3 * r.times.search,
         1e-3 * r.times.rows,
@@ -156,6 +171,7 @@ fn trace(number: usize, f: &Facts) {
         f.kinetic,
         f.energy_gain,
         f.momentum_error,
+        f.balance_error,
         r.recovery_work,
         r.intersections,
     );
@@ -181,7 +197,7 @@ fn summary(name: &str, all: &[Facts], errors: &mut [f64]) {
     };
     println!(
         "{name} | {} | {} | {} | {}/{}/{}/{}/{} | {} | {} | {} | {:.0}/{:.0}/{:.0} | {} | {:.1}/{:.1}/{:.1} | {:.1} | {} | \
-         {:.1e} | {:.1e} | {:.1e}/{:.1e}",
+         {:.1e} | {:.1e} | {:.1e} | {:.1e}/{:.1e}",
         all.len(),
         most(&|x| f64::from(x.report.contacts)),
         most(&|x| f64::from(x.report.active_contacts)),
@@ -204,6 +220,7 @@ fn summary(name: &str, all: &[Facts], errors: &mut [f64]) {
         count(&|x| x.report.intersections.unwrap_or(0) > 0),
         most(&|x| x.energy_gain / x.energy_free.max(f64::MIN_POSITIVE)),
         most(&|x| x.momentum_error),
+        most(&|x| x.balance_error),
         quantile(errors, 0.5),
         quantile(errors, 1.0),
     );

@@ -74,6 +74,8 @@ pub struct Facts {
     /// `|sum m (v - v*) - sum impulses|` over free bodies, relative to the sum of `m |v - v*|` and
     /// a thousandth of that of `m |v|`.
     pub momentum_error: f64,
+    /// `|sum impulses + momentum taken by infinite masses|`, relative to the sum of `|impulses|`.
+    pub balance_error: f64,
     /// Largest speed `[m/s]`.
     pub speed: f64,
     /// Kinetic energy `[J]`.
@@ -249,11 +251,12 @@ impl Host {
         let mass = |b: usize| {
             if b < n { self.elastic.masses[b] } else { self.rigid_masses[(b - n) / 2].0 }
         };
-        let (mut gained, mut given, mut size) = ([0.0; 3], [0.0; 3], 0.0);
+        let (mut gained, mut given, mut size, mut total) = ([0.0; 3], [0.0; 3], 0.0, 0.0);
         for b in (0..n).chain((n..self.model.block_count).step_by(2)) {
             let change = sub(v[b], free[b]);
             gained = add_scaled(gained, mass(b), change);
             given = add_scaled(given, 1.0, self.result.impulses[b]);
+            total += norm(self.result.impulses[b]);
             // A change of a thousandth of the velocity is within the default contact tolerance.
             size += mass(b) * (norm(change) + 1e-3 * norm(v[b]));
         }
@@ -265,6 +268,7 @@ impl Host {
             energy_gain: self.metric_energy(linear, v) - energy_free,
             energy_free,
             momentum_error: if size > 0.0 { norm(sub(gained, given)) / size } else { 0.0 },
+            balance_error: if total > 0.0 { norm(add_scaled(given, 1.0, report.momentum_taken)) / total } else { 0.0 },
             speed: self.velocities.iter().map(|v| norm(*v)).fold(0.0, f64::max),
             kinetic,
             report,

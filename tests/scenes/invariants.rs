@@ -31,6 +31,8 @@ fn check(name: &str, number: usize, facts: &Facts, speed_limit: f64) {
     assert_eq!(r.intersections, Some(0), "{name}: step {number}");
     assert!(r.certified_fraction == 1.0, "{name}: step {number} stands at {}", r.certified_fraction);
     assert!(facts.speed.is_finite() && facts.speed < speed_limit, "{name}: step {number}: {} m/s", facts.speed);
+    // Equal and opposite, to rounding.
+    assert!(facts.balance_error < 1e-10, "{name}: step {number}: {}", facts.balance_error);
     // |v|_A <= |v*|_A up to the residual and the reported recovery work [ALGORITHMS: what is true of energy]. Held
     // vertices and zones leave the metric solution, and are counted by the scenes instead.
     if r.held_vertices == 0 && r.rigid_zones == 0 {
