@@ -27,7 +27,8 @@ impl CandidateSearch {
     /// Vertex-face and edge-edge pairs whose boxes, swept from `x0` to `x1` and thickened by `factor` times the half
     /// thicknesses, overlap; a superset of them when kept from an earlier call.
     ///
-    /// Kept while no end position moved by more than its body's half thickness, which the boxes hold in addition.
+    /// Boxes are thickened by one half thickness more. Continuous detection needs half of one, so that candidates are
+    /// kept while no end position moves by more than `factor + 1/2` half thicknesses along an axis.
     pub fn update(
         &mut self,
         model: &Model,
@@ -69,8 +70,8 @@ impl CandidateSearch {
 impl Anchor {
     fn holds(&self, model: &Model, x0: &[Vec3], x1: &[Vec3], factor: f64) -> bool {
         let near = |(i, (a, b)): (usize, (&Vec3, &Vec3))| {
-            let margin = model.bodies[model.vertex_body[i] as usize].half_thickness;
-            sub(*a, *b).iter().all(|d| d.abs() <= 0.5 * margin)
+            let margin = (factor + 0.5) * model.bodies[model.vertex_body[i] as usize].half_thickness;
+            sub(*a, *b).iter().all(|d| d.abs() <= margin)
         };
         self.topology == model.topology_hash
             && self.factor == factor

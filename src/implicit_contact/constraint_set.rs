@@ -9,6 +9,10 @@ use crate::model::{Model, Settings};
 /// Share of the required gap that an existing row may miss before a hit of its pair is blamed on the solver.
 const MISSED_SHARE: f64 = 0.05;
 
+/// Contacts closer than this multiple of their thickness are rows from the start, so that a resting contact does not
+/// drop out by what its solve left over. Beyond, they are watched.
+const RESTING_SHARE: f64 = 1.1;
+
 /// What the last solve gave a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Solved {
@@ -31,6 +35,8 @@ pub struct ConstraintSet {
     pub kept_tangents: Vec<Option<Vec3>>,
     /// Impulse of the last solve, or the warm start.
     pub solved: Vec<Solved>,
+    /// Near pairs beyond their thickness that no tentative motion has brought within it yet.
+    pub watched: Vec<Contact>,
 }
 
 /// How a round of continuous detection changed the set.
@@ -43,13 +49,46 @@ pub struct Growth {
 }
 
 impl ConstraintSet {
-    /// The set of the contacts near the start, warm-started by key.
+    /// The set of the contacts near the start, warm-started by key; those beyond their thickness are watched.
     pub fn new(model: &Model, contacts: Vec<Contact>, memory: &Memory, settings: &Settings, dt: f64) -> ConstraintSet {
         let mut set = ConstraintSet::default();
         for contact in contacts {
-            set.push(model, contact, memory, settings, dt);
+            if contact.start_gap < RESTING_SHARE * contact.thickness {
+                set.push(model, contact, memory, settings, dt);
+            } else {
+                set.watched.push(contact);
+            }
         }
         set
+    }
+
+    /// Whether a watched contact is at less than `share` of its thickness at `end`.
+    pub fn would_admit(&self, end: &[Vec3], share: f64) -> bool {
+        self.watched.iter().any(|c| c.gap(end) < share * c.thickness)
+    }
+
+    /// Takes in the watched contacts that a motion to `end` brings to less than `share` of their thickness; how many.
+    ///
+    /// This keeps a resting contact at its gap: it would otherwise drop out one rounding above it, fall to half of it
+    /// before continuous detection sees it, and be pushed up again.
+    pub fn admit(
+        &mut self,
+        model: &Model,
+        end: &[Vec3],
+        share: f64,
+        memory: &Memory,
+        settings: &Settings,
+        dt: f64,
+    ) -> usize {
+        let (near, far) =
+            std::mem::take(&mut self.watched).into_iter().partition(|c: &Contact| c.gap(end) < share * c.thickness);
+        self.watched = far;
+        let near: Vec<Contact> = near;
+        let count = near.len();
+        for contact in near {
+            self.push(model, contact, memory, settings, dt);
+        }
+        count
     }
 
     fn push(&mut self, model: &Model, contact: Contact, memory: &Memory, settings: &Settings, dt: f64) {

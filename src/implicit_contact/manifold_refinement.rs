@@ -22,6 +22,9 @@ const POSITION_SHARE: f64 = 0.1;
 /// linearised anew.
 const LINEARISATION_SHARE: f64 = 0.02;
 
+/// A clean end that leaves a watched pair less than this share of its thickness is refined once more.
+const ADMITTED_SHARE: f64 = 0.98;
+
 /// What stays the same over the segments of a step.
 pub(super) struct Surroundings<'a> {
     pub metric: &'a Metric,
@@ -99,6 +102,7 @@ pub(super) fn refine(
     let candidates = scratch.candidates.update(model, around.filter, x0, &linear_end.positions, factor, par);
     let near = near_contacts(model, around.filter, passing, candidates, segment.start, &linear_end, factor, par);
     refined.set = ConstraintSet::new(model, near, memory, settings, segment.dt);
+    refined.set.admit(model, &linear_end.positions, 1.0, memory, settings, segment.dt);
     account.search += lap(&mut clock);
     let scale_of_motion = fastest(x0, &linear_end.positions, segment.dt);
     let mut tolerance_factor = 1.0;
@@ -124,15 +128,17 @@ pub(super) fn refine(
         refined.hits = swept_hits(model, around.filter, passing, candidates, segment.start, &refined.end, par);
         account.detection += lap(&mut clock);
         unrounded_end(segment, &refined, &mut linear_end);
+        let end = &linear_end.positions;
         if refined.hits.is_empty() {
             let settled = worst_linearisation(segment, &refined, &linear_end) <= LINEARISATION_SHARE;
-            if settled {
+            if settled && !refined.set.would_admit(end, ADMITTED_SHARE) {
                 return refined;
             }
             clean = Some(refined.clone());
+            refined.set.admit(model, end, ADMITTED_SHARE, memory, settings, segment.dt);
             continue;
         }
-        let end = &linear_end.positions;
+        refined.set.admit(model, end, 1.0, memory, settings, segment.dt);
         let growth = refined.set.grow(model, &refined.hits, end, memory, settings, segment.dt, tightened);
         if growth.missed > 0 {
             tolerance_factor *= TIGHTER;

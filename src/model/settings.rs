@@ -60,7 +60,8 @@ pub struct Settings {
     pub halvings_max: u32,
     /// Thickness regained per step at most, as a fraction of the pair thickness.
     pub recovery_fraction: f64,
-    /// Proximity range at the start of a step, as a multiple of the pair thickness.
+    /// Proximity range at the start of a step, as a multiple of the pair thickness, at least 1. Pairs beyond 1 become
+    /// contacts when a tentative motion brings them within their thickness.
     pub proximity_factor: f64,
     /// A rigid or kinematic part that turns more than this in a step is subdivided in time `[rad]`.
     pub turn_max: f64,
@@ -80,7 +81,7 @@ impl Default for Settings {
             rounds_max: 5,
             halvings_max: 2,
             recovery_fraction: 0.1,
-            proximity_factor: 1.0,
+            proximity_factor: 2.0,
             turn_max: 0.5,
             certify: false,
         }

@@ -1,0 +1,21 @@
+//! What must hold in every step: balances of momentum and energy, friction limits, no intersection, fail-safes in order,
+//! the same bits on any number of threads, errors that change nothing.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+#[allow(dead_code, unused_imports)]
+#[path = "../../benches/support/mod.rs"]
+mod support;
+
+mod world;
+
+mod division;
+mod energy;
+mod friction;
+mod inputs;
+mod momentum;
+mod pinch;
+mod resting;
+mod spinning;
+mod tangled;
+mod threads;
+mod tunnelling;
