@@ -5,8 +5,9 @@ use super::near::half_space_pairs;
 use super::pair::BodyFilter;
 use super::passing::Passing;
 use super::swept::{Hit, swept_hits};
-use crate::detection::{BroadPhase, Candidates};
-use crate::math::{Vec3, dot};
+use crate::detection::intersection;
+use crate::math::predicates::{plane_side, segment_meets_triangle};
+use crate::math::{Vec3, add_scaled, dot};
 use crate::model::{Model, State, Witness};
 use crate::parallel::Par;
 
@@ -27,7 +28,7 @@ pub fn intersections(model: &Model, filter: &BodyFilter, state: &State, par: Par
     let mut tangle = Tangle::default();
     let body_of = |v: u32| model.vertex_body[v as usize] as usize;
     let allowed = |a: u32, b: u32| filter.allows(body_of(a), body_of(b));
-    for found in find(model, &state.positions, &allowed, par) {
+    for found in intersection::find(&primitives(model), &state.positions, &allowed, par) {
         let (edge, face) = (model.edges[found.edge as usize], model.faces[found.face as usize]);
         let bodies = [body_of(edge[0]), body_of(face[0])];
         if bodies[0] == bodies[1] && touches_at_rest(model, edge, face) {
@@ -45,8 +46,9 @@ pub fn intersections(model: &Model, filter: &BodyFilter, state: &State, par: Par
     for pair in half_space_pairs(model, filter) {
         let [body, plane] = pair.bodies(model);
         let (x, h) = (state.positions[pair.features[0] as usize], &state.half_spaces[plane]);
-        if dot(h.normal, x) - h.offset < 0.0 {
-            tangle.witnesses.push(half_space_witness(model, pair.features[0], [body, plane], x));
+        if plane_side(h.normal, h.offset, x) < 0 {
+            let on_plane = add_scaled(x, h.offset - dot(h.normal, x), h.normal);
+            tangle.witnesses.push(half_space_witness(model, pair.features[0], [body, plane], on_plane));
             tangle.passing.insert(pair.features[0], model.rest.len());
         }
     }
@@ -64,39 +66,9 @@ fn half_space_witness(model: &Model, vertex: u32, bodies: [usize; 2], point: Vec
 
 /// Whether an edge and a face of one surface meet in the rest shape, so that their meeting says nothing.
 fn touches_at_rest(model: &Model, edge: [u32; 2], face: [u32; 3]) -> bool {
-    edge_meets_face(&edge.map(|v| model.rest[v as usize]), &face.map(|v| model.rest[v as usize]))
-}
-
-struct Found {
-    edge: u32,
-    face: u32,
-    point: Vec3,
-}
-
-fn find(model: &Model, x: &[Vec3], allowed: &crate::detection::Filter, par: Par) -> Vec<Found> {
-    let mut broad = BroadPhase::build(&primitives(model));
-    broad.refit(x, x, &[], par);
-    let mut candidates = Candidates::default();
-    broad.edge_face_candidates(allowed, &mut candidates, par);
-    let meets = |pair: &&[u32; 2]| {
-        let e = model.edges[pair[0] as usize].map(|v| x[v as usize]);
-        let f = model.faces[pair[1] as usize].map(|v| x[v as usize]);
-        edge_meets_face(&e, &f)
-    };
-    let found =
-        |pair: &[u32; 2]| Found { edge: pair[0], face: pair[1], point: x[model.edges[pair[0] as usize][0] as usize] };
-    candidates.edge_face.iter().filter(meets).map(found).collect()
-}
-
-fn edge_meets_face(e: &[Vec3; 2], f: &[Vec3; 3]) -> bool {
-    let c = |p: Vec3| robust::Coord3D { x: p[0], y: p[1], z: p[2] };
-    let o = |a, b, d, p| robust::orient3d(c(a), c(b), c(d), c(p));
-    let (s0, s1) = (o(f[0], f[1], f[2], e[0]), o(f[0], f[1], f[2], e[1]));
-    if s0 * s1 > 0.0 || (s0 == 0.0 && s1 == 0.0) || (s0 > 0.0) == (s1 > 0.0) && s0 != 0.0 && s1 != 0.0 {
-        return false;
-    }
-    let t = [o(e[0], e[1], f[0], f[1]), o(e[0], e[1], f[1], f[2]), o(e[0], e[1], f[2], f[0])];
-    t.iter().all(|v| *v >= 0.0) || t.iter().all(|v| *v <= 0.0)
+    let [p, q] = edge.map(|v| model.rest[v as usize]);
+    let [a, b, c] = face.map(|v| model.rest[v as usize]);
+    segment_meets_triangle(p, q, a, b, c)
 }
 
 /// Hits on straight chords from `before` to `after`: empty when nothing tunnels between two states that a host pushes.

@@ -6,6 +6,7 @@ use super::pair::{BodyFilter, Pair, PairKind, gather};
 use super::passing::Passing;
 use crate::detection::Candidates;
 use crate::detection::ccd::{edge_edge, point_triangle};
+use crate::math::predicates::plane_side;
 use crate::math::{Vec3, lerp, norm_squared, sub};
 use crate::model::{Model, State};
 use crate::parallel::Par;
@@ -108,9 +109,11 @@ fn half_space_hit(model: &Model, passing: &Passing, pair: Pair, start: &State, e
     let contact = half_space_contact(pair, h0, h1, x0, thickness);
     let separation = minimum_separation(thickness, contact.start_gap);
     let end_gap = contact.gap(&end.positions);
-    if end_gap >= separation {
+    // The rounded gap decides the separation, the exact side of the plane the rest.
+    if end_gap >= separation && plane_side(h1.normal, h1.offset, x1) >= 0 {
         return None;
     }
-    let time = ((contact.start_gap - separation) / (contact.start_gap - end_gap)).clamp(0.0, 1.0);
+    let approach = contact.start_gap - end_gap;
+    let time = if approach > 0.0 { ((contact.start_gap - separation) / approach).clamp(0.0, 1.0) } else { 0.0 };
     Some(Hit { pair, time, contact })
 }
