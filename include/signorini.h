@@ -692,6 +692,11 @@
 #define SGN_WITNESS_POINT 3
 
 /**
+ * Kind, U32 or U64: 0 edge-triangle, 1 vertex-half-space.
+ */
+#define SGN_WITNESS_KIND 4
+
+/**
  * Log, last error and executor of a host. Any number per process; nothing else is shared between them.
  */
 typedef struct SgnContext SgnContext;
@@ -2265,8 +2270,6 @@ SgnResult sgn_get_api(uint32_t abi,
 }  // extern "C"
 #endif  // __cplusplus
 
-#endif  /* SIGNORINI_H */
-
 /* Views of packed memory, for short. */
 static inline SgnView sgn_view(SgnFormat format, const void *ptr, uint64_t count) {
   SgnView view = {SGN_FORMAT_NONE, 0, NULL, 0, 0, 0};
@@ -2282,3 +2285,5 @@ static inline SgnViewMut sgn_view_mut(SgnFormat format, void *ptr, uint64_t coun
   view.count = count;
   return view;
 }
+
+#endif  /* SIGNORINI_H */

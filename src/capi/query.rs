@@ -41,6 +41,9 @@ pub const SGN_WITNESS_FEATURES: i32 = 2;
 /// A point of the intersection, F32X3 or F64X3.
 pub const SGN_WITNESS_POINT: i32 = 3;
 
+/// Kind, U32 or U64: 0 edge-triangle, 1 vertex-half-space.
+pub const SGN_WITNESS_KIND: i32 = 4;
+
 /// Outcome of a check. Fill with `sgn_check_report_init`.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -107,6 +110,7 @@ fn witness_table(world: &World, attribute: SgnWitnessAttribute) -> Result<Table,
         SGN_WITNESS_BODIES => pairs(witnesses, |w| w.bodies.map(|key| world.id_of_key(key))),
         SGN_WITNESS_FEATURES => pairs(witnesses, |w| w.features.map(u64::from)),
         SGN_WITNESS_POINT => vectors(witnesses, |w| w.point),
+        SGN_WITNESS_KIND => integers(witnesses, |w| u64::from(w.kind)),
         _ => return Err(unknown(attribute)),
     })
 }

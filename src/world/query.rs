@@ -2,9 +2,11 @@
 
 use super::body::Body;
 use super::{Fault, World, WorldError};
+use crate::contact_search::{BodyFilter, intersections};
 use crate::kinematics::Pose;
 use crate::math::{Vec3, ZERO};
 use crate::model::{ContactRecord, HalfSpace, Kind, Precision, Surface, Witness};
+use crate::parallel::Par;
 use std::sync::Arc;
 
 /// Kind of a body.
@@ -136,11 +138,13 @@ impl World {
         &self.witnesses
     }
 
-    /// Number of intersections of the present state; their witnesses are kept.
-    pub fn check(&mut self, _par: crate::parallel::Par) -> Result<usize, WorldError> {
+    /// Number of intersections of the present state, by exact predicates; their witnesses are kept.
+    pub fn check(&mut self, par: Par) -> Result<usize, WorldError> {
         self.build_model()?;
         self.gather_state();
-        Err(WorldError::new(Fault::Unsupported, "the check is not there yet"))
+        let filter = BodyFilter::new(&self.model);
+        self.witnesses = intersections(&self.model, &filter, &self.state, par).witnesses;
+        Ok(self.witnesses.len())
     }
 
     /// Id of the body that a contact or witness names by its key.

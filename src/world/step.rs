@@ -2,6 +2,7 @@
 
 use super::body::Body;
 use super::{Fault, World, WorldError};
+use crate::contact_search::{BodyFilter, intersections, swept_free};
 use crate::implicit_contact::advance;
 use crate::math::ZERO;
 use crate::model::{BodyDescription, BuildError, Model, Settings, State, StepError, StepReport, System};
@@ -37,6 +38,7 @@ impl World {
         self.build_model()?;
         self.gather()?;
         self.witnesses.clear();
+        self.check_pushed_starts(par)?;
         let outcome = advance(
             &self.model,
             &mut self.state,
@@ -124,6 +126,43 @@ impl World {
                 place(kept, index, body.vertices.clone(), &mut self.state);
             }
         }
+    }
+
+    /// Sweeps bodies from where the last step left them to starts that were pushed without a teleport.
+    fn check_pushed_starts(&mut self, par: Par) -> Result<(), WorldError> {
+        let mut before = self.state.clone();
+        let mut moved = false;
+        for (index, body) in self.model.bodies.iter().enumerate() {
+            let kept = self.bodies.get(self.bodies.id_of_key(body.description.key))?;
+            if let Some(certified) = &kept.certified {
+                moved = true;
+                if !certified.positions.is_empty() {
+                    before.positions[body.vertices.clone()].copy_from_slice(&certified.positions);
+                }
+                before.poses[index] = certified.pose;
+                before.half_spaces[index] = certified.half_space;
+            }
+        }
+        if !moved {
+            return Ok(());
+        }
+        let filter = BodyFilter::new(&self.model);
+        let mut hits = swept_free(&self.model, &filter, &before, &self.state, par);
+        if !hits.is_empty() {
+            // What was tangled where the last step ended goes on passing.
+            let tangled = intersections(&self.model, &filter, &before, par).passing;
+            hits.retain(|hit| !tangled.touches(&hit.pair.vertices(&self.model)));
+        }
+        let Some(first) = hits.first() else { return Ok(()) };
+        let of = |body: usize| self.bodies.id_of_key(self.model.bodies[body].description.key);
+        let [a, b] = first.pair.bodies(&self.model).map(of);
+        let [i, j] = first.pair.local_features(&self.model);
+        let message = format!(
+            "a start was pushed that comes too close to something on the way from where the last step ended ({} pairs; \
+             the first: feature {i} of body {a:#x} and feature {j} of body {b:#x}); push it as a teleport if it is one",
+            hits.len()
+        );
+        Err(WorldError::new(Fault::IntersectingStart, message).object(a).index(i as usize).value(first.time))
     }
 
     /// Takes the end state and the results back to the bodies.

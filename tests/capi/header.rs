@@ -19,7 +19,15 @@ fn generated() -> String {
     }
     let mut bytes = Vec::new();
     builder.generate().expect("cbindgen").write(&mut bytes);
-    parenthesise_negative_constants(&String::from_utf8(bytes).expect("UTF-8"))
+    let header = parenthesise_negative_constants(&String::from_utf8(bytes).expect("UTF-8"));
+    guard_the_trailer(&header)
+}
+
+/// cbindgen puts the trailer after the end of the include guard.
+fn guard_the_trailer(header: &str) -> String {
+    let end = "#endif  /* SIGNORINI_H */\n";
+    let (before, trailer) = header.split_once(end).expect("the end of the include guard");
+    format!("{before}{}\n{end}", trailer.trim_start())
 }
 
 /// cbindgen writes `#define X -9`; in an expression that wants parentheses.

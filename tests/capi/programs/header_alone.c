@@ -1,0 +1,3 @@
+#include "signorini.h"
+#include "signorini.h" /* guarded */
+typedef int not_empty;
