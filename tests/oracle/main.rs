@@ -2,7 +2,9 @@
 
 mod broad_phase;
 mod ccd_batch;
+mod ccd_data;
 mod ccd_distance;
+mod ccd_inclusion;
 mod ccd_separation;
 mod distance;
 mod intersection;
