@@ -4,76 +4,21 @@
 //! by one element, so a pair of leaves yields every vertex-face and edge-edge pair between them exactly once, in one
 //! traversal.
 
-use super::bvh::{Bvh, Frame, LEAF, MIXED, Overlap, PackedBox, item_boxes};
-use super::ownership::{Ownership, own};
+use super::bvh::{Bvh, Frame, LEAF, MIXED, PackedBox};
+use super::leaf_blocks::{Block, LeafBlocks};
+use super::ownership::{Lists, Ownership, own};
 use super::pair_lists::{PairLists, merge};
 use super::primitives::{Candidates, Filter, Motion, Primitives};
 use crate::geometry::Aabb;
 use crate::math::{Vec3, lerp};
-use crate::mesh::share_vertex;
 use crate::parallel::Par;
 
 /// Leaves per task of a parallel traversal.
 const TASK: usize = 64;
-/// Vertices, edges or faces of one leaf at most: three an element.
-const ITEMS: usize = 3 * LEAF;
+/// Blocks of four vertices, edges or faces of one leaf at most: three primitives an element.
+const BLOCKS: usize = (3 * LEAF).div_ceil(4);
 /// The tree is rebuilt when its branches have grown this much against the boxes of its leaves.
 const DECAY: f64 = 1.5;
-
-/// Primitives of one kind in the order of the leaves.
-#[derive(Clone, Debug, Default)]
-struct Items<const N: usize> {
-    /// Vertex index, edge number or face number.
-    numbers: Vec<u32>,
-    /// Vertices of each.
-    corners: Vec<[u32; N]>,
-    boxes: Vec<PackedBox>,
-    /// Start of each leaf, and the end.
-    offsets: Vec<u32>,
-}
-
-impl<const N: usize> Items<N> {
-    fn arrange(numbers: Vec<u32>, offsets: Vec<u32>, corners: impl Fn(u32) -> [u32; N]) -> Self {
-        let corners = numbers.iter().map(|n| corners(*n)).collect();
-        Items { numbers, corners, boxes: Vec::new(), offsets }
-    }
-
-    #[inline(always)]
-    fn leaf(&self, leaf: u32) -> std::ops::Range<usize> {
-        self.offsets[leaf as usize] as usize..self.offsets[leaf as usize + 1] as usize
-    }
-
-    /// The items of a leaf that overlap a box: their places, and how many.
-    #[inline(always)]
-    fn near(&self, leaf: u32, b: &PackedBox, out: &mut [u32; ITEMS]) -> usize {
-        let mut count = 0;
-        for i in self.leaf(leaf) {
-            out[count] = i as u32;
-            count += usize::from(self.boxes[i].overlaps(b));
-        }
-        count
-    }
-}
-
-/// Items of one kind near a box.
-struct Near {
-    places: [u32; ITEMS],
-    count: usize,
-}
-
-impl Near {
-    #[inline(always)]
-    fn of<const N: usize>(items: &Items<N>, leaf: u32, b: &PackedBox) -> Near {
-        let mut near = Near { places: [0; ITEMS], count: 0 };
-        near.count = items.near(leaf, b, &mut near.places);
-        near
-    }
-
-    #[inline(always)]
-    fn iter(&self) -> impl Iterator<Item = usize> {
-        self.places[..self.count].iter().map(|p| *p as usize)
-    }
-}
 
 /// Which pairs a traversal collects.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -92,9 +37,9 @@ pub struct BroadPhase {
     built: bool,
     /// Extent of the branches against that of the leaves when the tree was built.
     quality: f64,
-    leaf_vertices: Items<1>,
-    leaf_edges: Items<2>,
-    leaf_faces: Items<3>,
+    leaf_vertices: LeafBlocks<1>,
+    leaf_edges: LeafBlocks<2>,
+    leaf_faces: LeafBlocks<3>,
     leaves: Vec<PackedBox>,
     /// By vertex index.
     boxes: Vec<Aabb>,
@@ -114,9 +59,9 @@ impl BroadPhase {
             tree: Bvh::default(),
             built: false,
             quality: 0.0,
-            leaf_vertices: Items::default(),
-            leaf_edges: Items::default(),
-            leaf_faces: Items::default(),
+            leaf_vertices: LeafBlocks::default(),
+            leaf_edges: LeafBlocks::default(),
+            leaf_faces: LeafBlocks::default(),
             leaves: Vec::new(),
             boxes: Vec::new(),
             packed: Vec::new(),
@@ -164,35 +109,32 @@ impl BroadPhase {
         centres.extend(owned.loose_edges.iter().map(|e| centre(&edges[*e as usize])));
         centres.extend(owned.loose_vertices.iter().map(|v| centre(&[*v])));
         let (tree, order) = Bvh::build(&centres, &owned.components);
-        let leaf_order = |lists: &super::ownership::Lists| lists.gather(&order, LEAF);
-        let (numbers, offsets) = leaf_order(&owned.vertices);
-        self.leaf_vertices = Items::arrange(numbers, offsets, |v| [v]);
-        let (numbers, offsets) = leaf_order(&owned.edges);
-        self.leaf_edges = Items::arrange(numbers, offsets, |e| edges[e as usize]);
-        let mut offsets = vec![0];
-        let mut numbers = Vec::with_capacity(faces.len());
-        for leaf in order.chunks(LEAF) {
-            numbers.extend(leaf.iter().copied().filter(|e| (*e as usize) < faces.len()));
-            offsets.push(numbers.len() as u32);
-        }
-        self.leaf_faces = Items::arrange(numbers, offsets, |f| faces[f as usize]);
+        let gather = |lists: &Lists| -> Vec<Vec<u32>> {
+            let of = |leaf: &[u32]| leaf.iter().flat_map(|e| lists.of(*e)).copied().collect();
+            order.chunks(LEAF).map(of).collect()
+        };
+        self.leaf_vertices = LeafBlocks::arrange(gather(&owned.vertices).iter().map(Vec::as_slice), |v| [v]);
+        let edges_of = gather(&owned.edges);
+        self.leaf_edges = LeafBlocks::arrange(edges_of.iter().map(Vec::as_slice), |e| edges[e as usize]);
+        let is_face = |e: &u32| (*e as usize) < faces.len();
+        let faces_of: Vec<Vec<u32>> = order.chunks(LEAF).map(|l| l.iter().copied().filter(is_face).collect()).collect();
+        self.leaf_faces = LeafBlocks::arrange(faces_of.iter().map(Vec::as_slice), |f| faces[f as usize]);
         self.tree = tree;
         self.built = true;
     }
 
     /// New boxes of items, leaves and branches. Returns the extent of the branches against that of the leaves.
     fn fit(&mut self, par: Par) -> f64 {
-        item_boxes(&self.leaf_vertices.corners, &self.packed, &mut self.leaf_vertices.boxes, par);
-        item_boxes(&self.leaf_edges.corners, &self.packed, &mut self.leaf_edges.boxes, par);
-        item_boxes(&self.leaf_faces.corners, &self.packed, &mut self.leaf_faces.boxes, par);
-        let count = self.tree.components.len();
-        self.leaves.resize(count, PackedBox::EMPTY);
+        self.leaf_vertices.refit(&self.packed, par);
+        self.leaf_edges.refit(&self.packed, par);
+        self.leaf_faces.refit(&self.packed, par);
+        self.leaves.resize(self.tree.components.len(), PackedBox::EMPTY);
         let (vertices, edges, faces) = (&self.leaf_vertices, &self.leaf_edges, &self.leaf_faces);
         par.map_into(&mut self.leaves, |leaf| {
             let leaf = leaf as u32;
-            let all = vertices.boxes[vertices.leaf(leaf)].iter();
-            let all = all.chain(&edges.boxes[edges.leaf(leaf)]).chain(&faces.boxes[faces.leaf(leaf)]);
-            all.fold(PackedBox::EMPTY, |a, b| a.union(b))
+            let all = vertices.leaf(leaf).iter().map(Block::bounds);
+            let all = all.chain(edges.leaf(leaf).iter().map(Block::bounds));
+            all.chain(faces.leaf(leaf).iter().map(Block::bounds)).fold(PackedBox::EMPTY, |a, b| a.union(&b))
         });
         self.tree.refit(&self.leaves)
     }
@@ -238,7 +180,7 @@ impl BroadPhase {
         let own = self.tree.components[a as usize];
         let passes =
             |other: u32| own == MIXED || other == MIXED || filter(self.representative(own), self.representative(other));
-        self.tree.visit(&self.leaves[a as usize], a, passes, |b| {
+        self.tree.visit(&self.leaves[a as usize].query(), a, passes, |b| {
             // Within one component on each side the filter has been asked already.
             let mixed = own == MIXED || self.tree.components[b as usize] == MIXED;
             let pass = |v: u32, w: u32| !mixed || filter(v, w);
@@ -250,81 +192,101 @@ impl BroadPhase {
     }
 
     fn contacts(&self, a: u32, b: u32, pass: &impl Fn(u32, u32) -> bool, found: &mut Found) {
-        let (box_a, box_b) = (&self.leaves[a as usize], &self.leaves[b as usize]);
+        let (box_a, box_b) = (self.leaves[a as usize].query(), self.leaves[b as usize].query());
         let (vertices, edges, faces) = (&self.leaf_vertices, &self.leaf_edges, &self.leaf_faces);
-        let near_faces = Near::of(faces, b, box_a);
-        if near_faces.count > 0 {
-            self.pairs(vertices, &Near::of(vertices, a, box_b), faces, &near_faces, pass, &mut found.first);
+        let mut side = Side { boxes: &self.boxes, pass, out: &mut found.first };
+        side.pairs(vertices.leaf(a), &box_b, faces.leaf(b), &box_a, false);
+        if a != b {
+            side.pairs(vertices.leaf(b), &box_a, faces.leaf(a), &box_b, false);
         }
-        let near_edges = Near::of(edges, a, box_b);
-        if a == b {
-            for i in near_edges.iter() {
-                for j in i + 1..edges.leaf(a).end {
-                    self.pair(edges, i, edges, j, pass, &mut found.second);
-                }
-            }
-            return;
-        }
-        let near_vertices = Near::of(vertices, b, box_a);
-        if near_vertices.count > 0 {
-            self.pairs(vertices, &near_vertices, faces, &Near::of(faces, a, box_b), pass, &mut found.first);
-        }
-        if near_edges.count > 0 {
-            self.pairs(edges, &near_edges, edges, &Near::of(edges, b, box_a), pass, &mut found.second);
-        }
+        side.out = &mut found.second;
+        side.pairs(edges.leaf(a), &box_b, edges.leaf(b), &box_a, a == b);
     }
 
     fn edge_faces(&self, a: u32, b: u32, pass: &impl Fn(u32, u32) -> bool, found: &mut Found) {
-        let (box_a, box_b) = (&self.leaves[a as usize], &self.leaves[b as usize]);
+        let (box_a, box_b) = (self.leaves[a as usize].query(), self.leaves[b as usize].query());
         let (edges, faces) = (&self.leaf_edges, &self.leaf_faces);
-        self.pairs(edges, &Near::of(edges, a, box_b), faces, &Near::of(faces, b, box_a), pass, &mut found.first);
+        let mut side = Side { boxes: &self.boxes, pass, out: &mut found.first };
+        side.pairs(edges.leaf(a), &box_b, faces.leaf(b), &box_a, false);
         if a != b {
-            self.pairs(edges, &Near::of(edges, b, box_a), faces, &Near::of(faces, a, box_b), pass, &mut found.first);
+            side.pairs(edges.leaf(b), &box_a, faces.leaf(a), &box_b, false);
         }
     }
+}
 
+/// Pairs between two leaves, and where they go.
+struct Side<'a, P> {
+    /// Boxes in double precision by vertex index, for ties.
+    boxes: &'a [Aabb],
+    pass: &'a P,
+    out: &'a mut Vec<[u32; 2]>,
+}
+
+impl<P: Fn(u32, u32) -> bool> Side<'_, P> {
+    /// All pairs of primitives of one leaf with those of another, each first restricted to the other's box. Of a list
+    /// with itself (`same`), each pair once.
     #[inline(always)]
     fn pairs<const N: usize, const M: usize>(
-        &self,
-        first: &Items<N>,
-        near_first: &Near,
-        second: &Items<M>,
-        near_second: &Near,
-        pass: &impl Fn(u32, u32) -> bool,
-        out: &mut Vec<[u32; 2]>,
+        &mut self,
+        first: &[Block<N>],
+        near_first: &[f32; 6],
+        second: &[Block<M>],
+        near_second: &[f32; 6],
+        same: bool,
     ) {
-        for i in near_first.iter() {
-            for j in near_second.iter() {
-                self.pair(first, i, second, j, pass, out);
+        let mut masks = [0; BLOCKS];
+        let mut any = 0;
+        for (mask, block) in masks.iter_mut().zip(second) {
+            *mask = block.near(near_second);
+            any |= *mask;
+        }
+        if any == 0 {
+            return;
+        }
+        for (i, block) in first.iter().enumerate() {
+            let mut lanes = block.near(near_first);
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                let (query, corners) = (block.query(lane), block.corners(lane));
+                for (j, other) in second.iter().enumerate().skip(if same { i } else { 0 }) {
+                    // Of its own block, only the lanes behind it.
+                    let behind = if same && i == j { !((2 << lane) - 1) } else { -1 };
+                    let hits = other.near(&query) & masks[j] & behind;
+                    if hits != 0 {
+                        self.found(block.number(lane), &corners, &query, other, hits);
+                    }
+                }
             }
         }
     }
 
+    /// Keeps the hits that share no vertex, overlap exactly and pass the filter.
     #[inline(always)]
-    fn pair<const N: usize, const M: usize>(
-        &self,
-        first: &Items<N>,
-        i: usize,
-        second: &Items<M>,
-        j: usize,
-        pass: &impl Fn(u32, u32) -> bool,
-        out: &mut Vec<[u32; 2]>,
+    fn found<const N: usize, const M: usize>(
+        &mut self,
+        number: u32,
+        corners: &[u32; N],
+        query: &[f32; 6],
+        other: &Block<M>,
+        hits: i32,
     ) {
-        let overlap = first.boxes[i].compare(&second.boxes[j]);
-        if overlap == Overlap::None {
-            return;
-        }
-        let (a, b) = (&first.corners[i], &second.corners[j]);
-        if share_vertex(a, b) || overlap == Overlap::Tie && !self.exact_box(a).overlaps(&self.exact_box(b)) {
-            return;
-        }
-        if pass(a[0], b[0]) {
-            let (m, n) = (first.numbers[i], second.numbers[j]);
-            // Edge-edge: the smaller first. The other kinds have their fixed order.
-            out.push(if N == M && n < m { [n, m] } else { [m, n] });
+        let mut hits = hits & !other.sharing(corners);
+        let proven = other.proven(query);
+        while hits != 0 {
+            let lane = hits.trailing_zeros() as usize;
+            hits &= hits - 1;
+            let other_corners = other.corners(lane);
+            let overlap = proven >> lane & 1 == 1 || self.exact_box(corners).overlaps(&self.exact_box(&other_corners));
+            if overlap && (self.pass)(corners[0], other_corners[0]) {
+                let n = other.number(lane);
+                // Edge-edge: the smaller first. The other kinds have their fixed order.
+                self.out.push(if N == M && n < number { [n, number] } else { [number, n] });
+            }
         }
     }
 
+    #[cold]
     fn exact_box<const N: usize>(&self, corners: &[u32; N]) -> Aabb {
         corners.iter().fold(Aabb::EMPTY, |b, v| b.union(&self.boxes[*v as usize]))
     }

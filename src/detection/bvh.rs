@@ -5,13 +5,13 @@
 //! are; and `packed(a) < packed(b)` proves `a < b`, so only ties need the double-precision boxes.
 
 use crate::geometry::Aabb;
-use crate::math::{Vec3, simd as lanes};
-use crate::parallel::Par;
+use crate::math::Vec3;
+use crate::math::simd::overlaps;
 
 /// Elements of a leaf.
 pub(super) const LEAF: usize = 8;
 
-/// A box in a [`Frame`]. The fourth lane overlaps always and strictly.
+/// A box in a [`Frame`]; the fourth lane is idle.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(16))]
 pub(super) struct PackedBox {
@@ -19,22 +19,8 @@ pub(super) struct PackedBox {
     high: [f32; 4],
 }
 
-/// How two packed boxes stand to each other.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Overlap {
-    /// The boxes that were packed are disjoint.
-    None,
-    /// They may touch: the packed boxes have a coordinate in common at their border.
-    Tie,
-    /// They overlap.
-    Proven,
-}
-
 impl PackedBox {
-    pub const EMPTY: PackedBox = PackedBox {
-        low: [f32::INFINITY, f32::INFINITY, f32::INFINITY, -1.0],
-        high: [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY, 1.0],
-    };
+    pub const EMPTY: PackedBox = PackedBox { low: [f32::INFINITY; 4], high: [f32::NEG_INFINITY; 4] };
 
     #[inline(always)]
     pub fn union(&self, other: &PackedBox) -> PackedBox {
@@ -46,21 +32,30 @@ impl PackedBox {
         out
     }
 
-    /// Whether the packed boxes overlap or touch.
-    #[inline(always)]
-    pub fn overlaps(&self, other: &PackedBox) -> bool {
-        lanes::at_most(&self.low, &other.high) & lanes::at_most(&other.low, &self.high) == 15
+    /// The union of four boxes given by lanes.
+    pub fn of_lanes(low: &[[f32; 4]; 3], high: &[[f32; 4]; 3]) -> PackedBox {
+        let mut out = PackedBox::EMPTY;
+        for k in 0..3 {
+            out.low[k] = low[k].iter().copied().fold(f32::INFINITY, f32::min);
+            out.high[k] = high[k].iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        }
+        out
     }
 
+    /// Writes the box into one of four lanes.
     #[inline(always)]
-    pub fn compare(&self, other: &PackedBox) -> Overlap {
-        if !self.overlaps(other) {
-            Overlap::None
-        } else if lanes::below(&self.low, &other.high) & lanes::below(&other.low, &self.high) == 15 {
-            Overlap::Proven
-        } else {
-            Overlap::Tie
+    pub fn write(&self, low: &mut [[f32; 4]; 3], high: &mut [[f32; 4]; 3], lane: usize) {
+        for k in 0..3 {
+            low[k][lane] = self.low[k];
+            high[k][lane] = self.high[k];
         }
+    }
+
+    /// For [`overlaps`].
+    #[inline(always)]
+    pub fn query(&self) -> [f32; 6] {
+        let (l, h) = (&self.low, &self.high);
+        [l[0], l[1], l[2], h[0], h[1], h[2]]
     }
 
     fn extent(&self) -> f64 {
@@ -94,14 +89,14 @@ impl Frame {
     }
 
     #[inline(always)]
-    fn lanes(&self, x: Vec3, fourth: f32) -> [f32; 4] {
+    fn lanes(&self, x: Vec3) -> [f32; 4] {
         let lane = |k: usize| ((x[k] - self.centre[k]) * self.scale) as f32;
-        [lane(0), lane(1), lane(2), fourth]
+        [lane(0), lane(1), lane(2), 0.0]
     }
 
     #[inline(always)]
     pub fn packed(&self, b: &Aabb) -> PackedBox {
-        PackedBox { low: self.lanes(b.low, -1.0), high: self.lanes(b.high, 1.0) }
+        PackedBox { low: self.lanes(b.low), high: self.lanes(b.high) }
     }
 }
 
@@ -132,32 +127,6 @@ impl Node {
         last: [0; 4],
         component: [MIXED; 4],
     };
-
-    fn set(&mut self, slot: usize, b: &PackedBox) {
-        for k in 0..3 {
-            self.low[k][slot] = b.low[k];
-            self.high[k][slot] = b.high[k];
-        }
-    }
-
-    fn bounds(&self) -> PackedBox {
-        let mut out = PackedBox::EMPTY;
-        for k in 0..3 {
-            out.low[k] = self.low[k].iter().copied().fold(f32::INFINITY, f32::min);
-            out.high[k] = self.high[k].iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        }
-        out
-    }
-
-    /// One bit per child that overlaps.
-    #[inline(always)]
-    fn overlaps(&self, b: &PackedBox) -> i32 {
-        let mut mask = 15;
-        for k in 0..3 {
-            mask &= lanes::at_most(&self.low[k], &[b.high[k]; 4]) & lanes::at_most(&[b.low[k]; 4], &self.high[k]);
-        }
-        mask
-    }
 }
 
 /// The tree over leaves; leaves are numbered from left to right.
@@ -252,10 +221,14 @@ impl Bvh {
                 let b = match self.nodes[index].child[slot] {
                     NONE => continue,
                     leaf if leaf & LEAF_BIT != 0 => leaves[(leaf & !LEAF_BIT) as usize],
-                    node => self.nodes[node as usize].bounds(),
+                    node => {
+                        let node = &self.nodes[node as usize];
+                        PackedBox::of_lanes(&node.low, &node.high)
+                    }
                 };
                 total += b.extent();
-                self.nodes[index].set(slot, &b);
+                let node = &mut self.nodes[index];
+                b.write(&mut node.low, &mut node.high, slot);
             }
         }
         total
@@ -264,14 +237,14 @@ impl Bvh {
     /// Calls `visit` for every leaf numbered `from` or higher whose box overlaps or touches `b`. Branches for whose
     /// component `enter` says no are left out ([`MIXED`] branches are always entered).
     #[inline(always)]
-    pub fn visit(&self, b: &PackedBox, from: u32, enter: impl Fn(u32) -> bool, mut visit: impl FnMut(u32)) {
+    pub fn visit(&self, b: &[f32; 6], from: u32, enter: impl Fn(u32) -> bool, mut visit: impl FnMut(u32)) {
         // A branch halves twice a level: 2^32 leaves are 16 levels of at most three open siblings.
         let mut stack = [0_u32; 64];
         let mut open = usize::from(!self.nodes.is_empty());
         while open > 0 {
             open -= 1;
             let node = &self.nodes[stack[open] as usize];
-            let mut mask = node.overlaps(b);
+            let mut mask = overlaps::<false>(&node.low, &node.high, b);
             while mask != 0 {
                 let slot = mask.trailing_zeros() as usize;
                 mask &= mask - 1;
@@ -316,21 +289,4 @@ fn halve(keyed: &mut [(Vec3, u32)]) -> usize {
     let split = leaves / 2 * LEAF;
     keyed.select_nth_unstable_by(split, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
     split
-}
-
-/// Boxes of `count` items, each the union of the boxes of its vertices.
-pub(super) fn item_boxes<const N: usize>(
-    items: &[[u32; N]],
-    vertices: &[PackedBox],
-    out: &mut Vec<PackedBox>,
-    par: Par,
-) {
-    out.resize(items.len(), PackedBox::EMPTY);
-    par.map_into(out, |i| {
-        let mut b = vertices[items[i][0] as usize];
-        for v in &items[i][1..] {
-            b = b.union(&vertices[*v as usize]);
-        }
-        b
-    });
 }

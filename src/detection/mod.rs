@@ -2,7 +2,7 @@
 //!
 //! * `primitives`: the collision primitives of a whole model, their motion, and the pairs found among them
 //! * `brute_force`: every pair tested; the oracle of the other structures
-//! * `ownership`, `bvh`, `pair_lists`, `broad_phase`: the same candidates by a tree of boxes
+//! * `ownership`, `bvh`, `leaf_blocks`, `pair_lists`, `broad_phase`: the same candidates by a tree of boxes
 //! * `proximity`: near pairs at a state, with weights, normals and distances
 //! * `intersection`: the certificate, edges against faces by exact predicates
 //! * `ccd`: continuous detection of one pair
@@ -12,6 +12,7 @@ pub mod brute_force;
 mod bvh;
 pub mod ccd;
 pub mod intersection;
+mod leaf_blocks;
 mod ownership;
 mod pair_lists;
 mod primitives;

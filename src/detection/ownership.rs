@@ -29,22 +29,8 @@ impl Lists {
         Lists { offsets, numbers }
     }
 
-    fn of(&self, element: u32) -> &[u32] {
+    pub fn of(&self, element: u32) -> &[u32] {
         &self.numbers[self.offsets[element as usize] as usize..self.offsets[element as usize + 1] as usize]
-    }
-
-    /// The numbers in the order of the elements, and where each group of `group` elements starts and the last ends.
-    pub fn gather(&self, order: &[u32], group: usize) -> (Vec<u32>, Vec<u32>) {
-        let mut numbers = Vec::with_capacity(self.numbers.len());
-        let mut offsets = Vec::with_capacity(order.len() / group + 2);
-        offsets.push(0);
-        for elements in order.chunks(group) {
-            for element in elements {
-                numbers.extend_from_slice(self.of(*element));
-            }
-            offsets.push(numbers.len() as u32);
-        }
-        (numbers, offsets)
     }
 }
 
