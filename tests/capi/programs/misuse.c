@@ -516,7 +516,7 @@ static void wrong_arrays(void) {
   desc = cloth_desc(&cloth);
   desc.triangles.ptr = triangles;
   GIVES(SGN_ERROR_BAD_TOPOLOGY, sgn_deformable_create(f.world, &desc, &body));
-  error_is(&f, SGN_ERROR_BAD_TOPOLOGY, 0, 9, VERTICES, "triangle 9");
+  error_is(&f, SGN_ERROR_BAD_TOPOLOGY, 0, 9, VERTICES, "(element 9)");
   triangles[9][1] = triangles[9][0];
   GIVES(SGN_ERROR_BAD_TOPOLOGY, sgn_deformable_create(f.world, &desc, &body));
   desc = cloth_desc(&cloth);
