@@ -383,7 +383,7 @@
 
 /**
  * A height field over the x-z plane: `points` holds `rows` times `columns` heights (one float each, row after row), rows
- * along z, columns along x, spread over `2 half_extents[0]` by `2 half_extents[2]`, heights scaled by `half_extents[1]`.
+ * along z, columns along x, spread over `2 half_extents[0]` by `2 half_extents[2]`. Open, facing up (y).
  */
 #define SGN_SHAPE_HEIGHT_FIELD 6
 

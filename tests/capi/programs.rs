@@ -1,6 +1,7 @@
 //! Programs in C and C++ that use the library as a host does. Each prints what it found wrong and says so by its status.
 
-use super::build::{Standard, compiler, root, run, succeed};
+use super::build::{Standard, build, compiler, library_folder, root, run, succeed};
+use std::process::Command;
 
 #[test]
 fn the_header_compiles_alone() {
@@ -28,4 +29,53 @@ fn passes(name: &str, standard: Standard) {
 #[test]
 fn misuse_is_a_status_and_changes_nothing() {
     passes("misuse.c", Standard::C99);
+}
+
+#[test]
+fn views_of_every_layout_are_read_and_written() {
+    passes("buffers.c", Standard::C99);
+}
+
+#[test]
+fn lives_leave_nothing_behind_and_callbacks_find_the_world_busy() {
+    passes("lifetimes.c", Standard::C99);
+}
+
+#[test]
+fn every_executor_and_floating_point_environment_gives_the_same_bits() {
+    passes("determinism.c", Standard::C99);
+}
+
+#[test]
+fn physics_through_the_c_abi() {
+    passes("physics.c", Standard::C99);
+}
+
+#[test]
+fn the_cpp_wrapper_drives_a_hammock() {
+    passes("wrapper.cpp", Standard::Cxx17);
+}
+
+#[test]
+fn a_host_loads_the_library_and_its_table() {
+    let library = library_folder().join("libsignorini.so");
+    let text = run("tests/capi/programs/loader.c", Standard::C99, &[&library.to_string_lossy()]);
+    assert_eq!(text, "PASS\n");
+}
+
+/// The programs that try everything once, under valgrind: no bad access, nothing lost. Slow, so only with SIGNORINI_ALL=1.
+#[test]
+fn valgrind_finds_nothing() {
+    if std::env::var_os("SIGNORINI_ALL").is_none() {
+        println!("skipped without SIGNORINI_ALL=1");
+        return;
+    }
+    for source in ["misuse.c", "buffers.c"] {
+        let program = build(&format!("tests/capi/programs/{source}"), Standard::C99);
+        let mut command = Command::new("valgrind");
+        command.args(["--quiet", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"]);
+        command.arg(program).env_remove("LD_LIBRARY_PATH");
+        let output = succeed(command);
+        assert!(String::from_utf8_lossy(&output.stdout).contains("PASS"), "{source}");
+    }
 }

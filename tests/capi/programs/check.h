@@ -13,8 +13,7 @@ static int failures = 0;
 #define CHECK(condition)                                                              \
   do {                                                                                \
     if (!(condition)) {                                                               \
-      failures++;                                                                     \
-      printf("%s:%d: %s\n", __FILE__, __LINE__, #condition);                          \
+      if (++failures <= 20) printf("%s:%d: %s\n", __FILE__, __LINE__, #condition);     \
     }                                                                                 \
   } while (0)
 
@@ -23,8 +22,8 @@ static int failures = 0;
   do {                                                                                \
     SgnResult got_ = (call);                                                          \
     if (got_ != (code)) {                                                             \
-      failures++;                                                                     \
-      printf("%s:%d: %s gives %d, not %s\n", __FILE__, __LINE__, #call, (int)got_, #code); \
+      if (++failures <= 20)                                                           \
+        printf("%s:%d: %s gives %d, not %s\n", __FILE__, __LINE__, #call, (int)got_, #code); \
     }                                                                                 \
   } while (0)
 
