@@ -57,7 +57,7 @@ pub fn advance(
     let around = Surroundings { metric: &metric, filter: &filter, settings, par };
     let pinch = run_parts(&around, model, state, drives, memory, dt, &mut passing, scratch, &mut account);
     // (8) Commit and report.
-    commit(model, state, memory, dt, result, &filter, &passing, settings, &mut account, par);
+    commit(&around, model, state, memory, dt, result, &passing, &mut account);
     let mut report = account.finished_report();
     report.bytes = (memory.bytes() + scratch.candidates.bytes()) as u64;
     report.times.total = lap(&mut whole);
@@ -133,16 +133,14 @@ fn run_parts(
 
 /// Stage 8: memory, state and result, all at once.
 fn commit(
+    around: &Surroundings,
     model: &Model,
     state: &mut State,
     memory: &mut Memory,
     dt: f64,
     result: &mut StepResult,
-    filter: &BodyFilter,
     passing: &Passing,
-    settings: &Settings,
     account: &mut StepAccount,
-    par: Par,
 ) {
     let mut clock = Instant::now();
     if account.last_dt > 0.0 {
@@ -156,8 +154,8 @@ fn commit(
         positions: state.positions.clone(),
         half_spaces: state.half_spaces.clone(),
     });
-    if settings.certify {
-        let found = intersections(model, filter, state, par).witnesses.len();
+    if around.settings.certify {
+        let found = intersections(model, around.filter, state, around.par).witnesses.len();
         account.report.intersections = Some(found as u32);
         if found > 0 {
             memory.certified = None;
@@ -241,7 +239,8 @@ fn check_poses(model: &Model, state: &State, drives: &Drives) -> Result<(), Step
         }
         for pose in [&state.poses[index], &drives.target_poses[index]] {
             let length: f64 = pose.orientation.iter().map(|c| c * c).sum();
-            if !is_finite(pose.position) || !((length - 1.0).abs() < 1e-3) {
+            let unit = (length - 1.0).abs() < 1e-3;
+            if !is_finite(pose.position) || !unit {
                 return fail("pose is not finite, or its quaternion not of unit length");
             }
         }

@@ -74,7 +74,7 @@ impl Memory {
                 });
             }
         }
-        self.contacts.sort_unstable_by(|a, b| a.key.cmp(&b.key));
+        self.contacts.sort_unstable_by_key(|contact| contact.key);
     }
 
     /// Remembers velocities per block, by body.

@@ -35,7 +35,8 @@ impl Engine {
     fn flags(self, kind: &str) -> Vec<String> {
         let (module, package) = self.package();
         let output = Command::new("pkg-config").args([kind, module]).output();
-        let output = output.unwrap_or_else(|e| panic!("pkg-config: {e}; install the package pkg-config (ci/setup does)"));
+        let output =
+            output.unwrap_or_else(|e| panic!("pkg-config: {e}; install the package pkg-config (ci/setup does)"));
         assert!(
             output.status.success(),
             "no {module}: install the package {package} (ci/setup does)\n{}",

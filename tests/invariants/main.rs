@@ -8,8 +8,10 @@ mod support;
 
 mod world;
 
+mod coupling;
 mod division;
 mod energy;
+mod fail_safes;
 mod friction;
 mod inputs;
 mod momentum;
@@ -17,5 +19,6 @@ mod pinch;
 mod resting;
 mod spinning;
 mod tangled;
+mod thickness;
 mod threads;
 mod tunnelling;

@@ -1,0 +1,144 @@
+//! Fail-safes alone: with one round and no division, rigid zones keep momentum, hold takes it, and every end is clean.
+
+use crate::world::*;
+use signorini::constraint::Metric;
+use signorini::contact_search::{BodyFilter, CandidateSearch, Passing, intersections};
+use signorini::fail_safe::{Sweep, hold};
+use signorini::math::{add, norm, sub};
+use signorini::model::{Segment, StepError};
+use signorini::parallel::Par;
+
+fn crude(world: &mut World) {
+    world.settings.rounds_max = 1;
+    world.settings.halvings_max = 0;
+}
+
+#[test]
+fn rigid_zones_keep_momentum_and_leave_no_intersection() {
+    let mut zones = 0;
+    for seed in 0..4 {
+        let mut jitter = Jitter(seed);
+        let mut plan = Plan::rubbing(0.4);
+        let cloth = sheet(10, 0.6);
+        plan.cloth(&cloth, moved(&cloth, [0.0; 3], &mut jitter, 0.003), 0.5, &[], [0.0, 0.3, 6.0]);
+        plan.last().self_collision = true;
+        let spin = [2.0, 3.0, 1.0];
+        plan.rigid(&ball(0.1), at([0.02, 0.01, 0.15]), 0.4, diagonal(0.0016), [0.0; 3], spin);
+        let mut world = plan.build();
+        crude(&mut world);
+        for step in 0..10 {
+            let before = momentum(&world, &world.velocities);
+            let report = world.step();
+            zones += report.rigid_zones;
+            let change = sub(momentum(&world, &world.result.velocities), before);
+            let taken = add(change, report.momentum_taken);
+            assert!(norm(taken) < 1e-9 * norm(before), "seed {seed} step {step}: {:e}, {report:?}", norm(taken));
+        }
+    }
+    assert!(zones > 0, "no zone was needed");
+}
+
+#[test]
+fn infinite_masses_take_the_momentum_that_is_reported() {
+    for on_mesh in [false, true] {
+        let mut plan = Plan::rubbing(0.4);
+        plan.rigid(&block([0.2; 3]), at([0.0, 0.0, 0.12]), 3.0, diagonal(0.02), [1.0, 0.0, -4.0], [0.0; 3]);
+        if on_mesh {
+            plan.scripted(&block([3.0, 3.0, 0.2]), at([0.0, 0.0, -0.1]));
+        } else {
+            plan.half_space([0.0, 0.0, 1.0], 0.0);
+        }
+        let mut world = plan.build();
+        world.gravity = [0.0, 0.0, -9.81];
+        let mut total = 0.0;
+        for _ in 0..10 {
+            world.prepare();
+            let free = momentum(&world, &world.drives.velocities);
+            let report = world.advance(Par::Serial).unwrap();
+            let lost = sub(free, momentum(&world, &world.result.velocities));
+            assert!(norm(sub(lost, report.momentum_taken)) < 1e-10 * (1.0 + norm(free)), "{lost:?} {report:?}");
+            total += norm(report.momentum_taken);
+        }
+        assert!(total > 10.0, "it must strike: {total}");
+    }
+}
+
+#[test]
+fn crude_settings_still_end_clean_between_scripted_jaws() {
+    let (mut zones, mut pinched) = (0, 0);
+    for seed in 0..6 {
+        let mut jitter = Jitter(seed);
+        let mut plan = Plan::rubbing(0.3);
+        let cloth = sheet(8, 0.3);
+        plan.cloth(&cloth, moved(&cloth, [0.0; 3], &mut jitter, 0.002), 0.1, &[], [0.3, 0.0, 1.0]);
+        plan.last().self_collision = true;
+        plan.rigid(&ball(0.05), at([0.0, 0.0, 0.06]), 0.3, diagonal(0.0003), [0.0, 0.0, -1.0], [5.0, 0.0, 3.0]);
+        let upper = plan.scripted(&block([0.3, 0.3, 0.05]), at([0.0, 0.01, 0.16]));
+        let lower = plan.scripted(&block([0.3, 0.3, 0.05]), at([0.01, 0.0, -0.05]));
+        let mut world = plan.build();
+        crude(&mut world);
+        for step in 0..14 {
+            world.prepare();
+            let way = if step < 9 { 1.0 } else { -1.0 };
+            for (key, sign) in [(upper, -1.0), (lower, 1.0)] {
+                let mut pose = world.pose(key).advanced([0.0; 3], [0.0, 0.3 * way, 0.2], world.dt);
+                pose.position[2] += sign * way * 0.006;
+                world.script(key, pose);
+            }
+            match world.advance(Par::Serial) {
+                Ok(report) => zones += report.rigid_zones,
+                Err(StepError::Pinched { report, .. }) => {
+                    pinched += 1;
+                    assert!(report.certified_fraction < 1.0);
+                }
+                Err(other) => panic!("seed {seed} step {step}: {other:?}"),
+            }
+            let filter = BodyFilter::new(&world.model);
+            let found = intersections(&world.model, &filter, &world.state, Par::Serial);
+            assert!(found.witnesses.is_empty(), "seed {seed} step {step}: {:?}", found.witnesses);
+        }
+    }
+    assert!(zones > 0 && pinched > 0, "zones {zones}, pinched {pinched}");
+}
+
+#[test]
+fn holding_grows_until_nothing_is_hit_and_held_parts_keep_their_bits() {
+    let mut jitter = Jitter(3);
+    let mut plan = Plan::rubbing(0.3);
+    let cloth = sheet(8, 0.4);
+    // Two sheets and a ball fly at each other; a third sheet is aside and free.
+    plan.cloth(&cloth, moved(&cloth, [0.0; 3], &mut jitter, 0.002), 0.1, &[], [0.0, 0.0, 8.0]);
+    plan.cloth(&cloth, moved(&cloth, [0.01, 0.02, 0.05], &mut jitter, 0.002), 0.1, &[], [0.0, 0.0, -8.0]);
+    plan.rigid(&ball(0.05), at([0.0, 0.0, 0.13]), 0.3, diagonal(0.0003), [0.0, 0.0, -9.0], [5.0, 0.0, 3.0]);
+    plan.cloth(&cloth, moved(&cloth, [2.0, 0.0, 0.0], &mut jitter, 0.002), 0.1, &[], [0.0, 0.0, 8.0]);
+    let mut world = plan.build();
+    world.prepare();
+    let filter = BodyFilter::new(&world.model);
+    let segment = Segment {
+        model: &world.model,
+        drives: &world.drives,
+        step_start: &world.state,
+        start: &world.state,
+        from: 0.0,
+        to: 1.0,
+        dt: world.dt,
+    };
+    let passing = Passing::default();
+    let sweep = Sweep { segment, filter: &filter, passing: &passing, factor: 1.0, par: Par::Serial };
+    let metric = Metric::new(&world.model, &world.state, &world.drives).unwrap();
+    let mut candidates = CandidateSearch::default();
+    let (_, hits) = sweep.test(&world.drives.velocities, 1.0, &mut candidates);
+    assert!(!hits.is_empty());
+    let outcome = hold(&sweep, &metric, &world.drives.velocities, &hits, &mut candidates);
+    assert!(outcome.hits.is_empty());
+    assert!(outcome.held.len() > 10);
+    let ball = world.model.body_index(3).unwrap();
+    assert_eq!(outcome.end.poses[ball], world.state.poses[ball], "the whole rigid body is held");
+    for node in outcome.held.iter().filter(|n| **n < world.model.rest.len()) {
+        assert_eq!(outcome.end.positions[*node], world.state.positions[*node]);
+    }
+    let aside = world.body(4).vertices.start;
+    assert!(outcome.end.positions[aside][2] > world.state.positions[aside][2] + 0.07, "what is free moves on");
+    let found = intersections(&world.model, &filter, &outcome.end, Par::Serial);
+    assert!(found.witnesses.is_empty());
+}
