@@ -67,7 +67,7 @@ impl World {
                 overrides.push((a.min(b), a.max(b), *friction));
             }
         }
-        overrides.sort_by(|x, y| (x.0, x.1).cmp(&(y.0, y.1)));
+        overrides.sort_by_key(|pair| (pair.0, pair.1));
         (Materials { list, overrides }, ids)
     }
 }

@@ -75,3 +75,18 @@ fn the_header_is_generated_from_the_sources() {
     assert!(names.len() > 40, "{names:?}");
     bless_or_compare("include/signorini.symbols", &(names.join("\n") + "\n"));
 }
+
+#[test]
+fn every_function_says_its_threads_and_errors() {
+    let header = generated();
+    let mut silent = Vec::new();
+    for name in functions(&header) {
+        let declaration = header.find(&format!(" {name}(")).expect("a declaration");
+        let comment = &header[header[..declaration].rfind("/**").expect("a comment")..declaration];
+        let comment = comment.to_lowercase();
+        if !comment.contains("thread") || !comment.contains("errors") {
+            silent.push(name);
+        }
+    }
+    assert!(silent.is_empty(), "{silent:?}");
+}

@@ -51,6 +51,14 @@ fn physics_through_the_c_abi() {
     passes("physics.c", Standard::C99);
 }
 
+/// Random calls; SIGNORINI_ALL=1 tries more of them.
+#[test]
+fn random_calls_give_statuses_and_refusals_change_nothing() {
+    let worlds = if std::env::var_os("SIGNORINI_ALL").is_some() { "2000" } else { "60" };
+    let text = run("tests/capi/programs/sequences.c", Standard::C99, &[worlds, "1"]);
+    assert!(text.lines().any(|line| line == "PASS"), "{text}");
+}
+
 #[test]
 fn the_cpp_wrapper_drives_a_hammock() {
     passes("wrapper.cpp", Standard::Cxx17);
@@ -73,7 +81,13 @@ fn valgrind_finds_nothing() {
     for source in ["misuse.c", "buffers.c"] {
         let program = build(&format!("tests/capi/programs/{source}"), Standard::C99);
         let mut command = Command::new("valgrind");
-        command.args(["--quiet", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"]);
+        command.args([
+            "--quiet",
+            "--error-exitcode=9",
+            "--leak-check=full",
+            "--show-leak-kinds=definite",
+            "--errors-for-leak-kinds=definite",
+        ]);
         command.arg(program).env_remove("LD_LIBRARY_PATH");
         let output = succeed(command);
         assert!(String::from_utf8_lossy(&output.stdout).contains("PASS"), "{source}");

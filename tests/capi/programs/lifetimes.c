@@ -175,6 +175,40 @@ static void errors_by_thread(void) {
   (void)desc;
 }
 
+/* Two threads at one world: the one that steps is not disturbed, the other is told that it is busy. */
+static void *read_on_thread(void *user) {
+  Probe *probe = user;
+  SgnStepDesc step;
+  uint64_t hash;
+  OK(sgn_step_desc_init(&step, sizeof step));
+  step.dt = 0.01;
+  for (int i = 0; i < 3000; i++) {
+    SgnResult read = sgn_world_state_hash(probe->world, &hash), stepped;
+    CHECK(read == SGN_OK || read == SGN_ERROR_BUSY);
+    stepped = sgn_world_step(probe->world, &step, NULL);
+    CHECK(stepped >= 0 || stepped == SGN_ERROR_BUSY);
+    if (stepped >= 0) probe->calls++;
+  }
+  return NULL;
+}
+
+static void two_threads(void) {
+  Probe probes[2];
+  pthread_t thread;
+  SgnDeformableDesc cloth_ = cloth_desc(&cloth);
+  memset(probes, 0, sizeof probes);
+  OK(sgn_context_create(SGN_ABI_VERSION, NULL, NULL, 0, &probes[0].context));
+  OK(sgn_world_create(probes[0].context, NULL, &probes[0].world));
+  OK(sgn_deformable_create(probes[0].world, &cloth_, &probes[0].body));
+  probes[1] = probes[0];
+  CHECK(pthread_create(&thread, NULL, read_on_thread, &probes[1]) == 0);
+  read_on_thread(&probes[0]);
+  CHECK(pthread_join(thread, NULL) == 0);
+  CHECK(probes[0].calls + probes[1].calls >= 3000);
+  OK(sgn_world_destroy(probes[0].world));
+  OK(sgn_context_destroy(probes[0].context));
+}
+
 /* Bodies come and go; ids stay apart, and a step sees who is there. */
 static void bodies_come_and_go(void) {
   SgnContext *context = NULL;
@@ -213,6 +247,7 @@ int main(void) {
   re_entry();
   errors_by_thread();
   bodies_come_and_go();
+  two_threads();
   thousand_lives();
   return finish();
 }
