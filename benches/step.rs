@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench step -- [SCENE...] [steps=N] [seed=S] [threads=T] [tight=N] [frames=DIR] [record=STEP,STEP:DIR] [range=M] [trace]`
 //!
-//! Scenes: drape, crumple, pile, cube, ball, boxes. `tight=N` solves every Nth step again to a tolerance far below the
+//! Scenes: drape, crumple, pile, cube, ball, boxes, tower. `tight=N` solves every Nth step again to a tolerance far below the
 //! default and compares; `frames=DIR` writes the elastic vertices of every tenth step as `f64`; `record=` writes the contact problems
 //! before those steps, pairs nearer than `range` (0.004); `trace` prints a line per step. Times are processor seconds of the calling thread, so give threads=0 (serial, the default) for figures.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -69,6 +69,7 @@ fn scene(name: &str, n: usize, seed: u64) -> (Host, usize) {
         "cube" => (scenes::cover_cube(n, seed), 150),
         "ball" => (scenes::catch_ball(n, 1.0, 1.0, seed), 200),
         "boxes" => (scenes::boxes(2, 5, seed), 80),
+        "tower" => (scenes::boxes(1, 3, seed), 45),
         other => panic!("no scene {other}"),
     }
 }
