@@ -15,7 +15,7 @@
 #define DT 0.01
 #define GRAVITY 9.81
 #define BOX_MASS 1.5
-#define STEPS 350
+#define STEPS 300
 #define LAST 50 /* the last half second is measured */
 
 static const double HALF_EXTENTS[3] = {0.14, 0.1, 0.12};
@@ -26,7 +26,7 @@ static HostCloth *make_cloth(uint64_t *random)
     HostCloth *cloth;
     uint32_t i;
 
-    s.columns = s.rows = 19;
+    s.columns = s.rows = 17;
     s.origin[0] = s.origin[2] = -0.6;
     s.along[0] = s.across[2] = 1.2;
     s.mass = 0.25;

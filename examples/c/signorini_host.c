@@ -142,6 +142,11 @@ SgnResult signorini_host_step(SignoriniHost *host, double dt)
     for (k = 0; k < 3; k++)
         host->momentum_taken[k] += report->momentum_taken[k];
     host->microseconds += report->total_microseconds;
+    host->stage_microseconds[0] += report->search_microseconds;
+    host->stage_microseconds[1] += report->rows_microseconds;
+    host->stage_microseconds[2] += report->solve_microseconds;
+    host->stage_microseconds[3] += report->detection_microseconds + report->fail_safe_microseconds;
+    host->stage_microseconds[4] += report->certificate_microseconds;
     host->worst_microseconds = fmax(host->worst_microseconds, report->total_microseconds);
     return result;
 }
@@ -193,6 +198,8 @@ void signorini_host_add_totals(SignoriniHost *host, const SignoriniHost *other)
     for (k = 0; k < 3; k++)
         host->momentum_taken[k] += other->momentum_taken[k];
     host->microseconds += other->microseconds;
+    for (k = 0; k < 5; k++)
+        host->stage_microseconds[k] += other->stage_microseconds[k];
     host->worst_microseconds = fmax(host->worst_microseconds, other->worst_microseconds);
 }
 
@@ -211,5 +218,8 @@ void signorini_host_print_totals(const SignoriniHost *host)
            (unsigned long long)host->unconverged_steps);
     printf("worst residual    complementarity %.1e, friction %.1e, dynamics %.1e\n", host->worst_complementarity,
            host->worst_friction, host->worst_dynamics);
-    printf("ms per step       %.2f mean, %.2f worst\n", host->microseconds / steps / 1e3, host->worst_microseconds / 1e3);
+    printf("ms per step       %.2f mean, %.2f worst: search %.2f, rows %.2f, solve %.2f, detection %.2f, certificate %.2f\n",
+           host->microseconds / steps / 1e3, host->worst_microseconds / 1e3, host->stage_microseconds[0] / steps / 1e3,
+           host->stage_microseconds[1] / steps / 1e3, host->stage_microseconds[2] / steps / 1e3,
+           host->stage_microseconds[3] / steps / 1e3, host->stage_microseconds[4] / steps / 1e3);
 }

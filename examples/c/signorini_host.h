@@ -24,6 +24,7 @@ typedef struct SignoriniHost {
     double worst_complementarity, worst_friction, worst_dynamics; /* residuals, relative */
     double momentum_taken[3];                                     /* by pins and half-spaces, and by held zones [N s] */
     double microseconds, worst_microseconds;
+    double stage_microseconds[5]; /* search, rows, solve, detection and fail-safes, certificate */
     SgnStepReport last; /* of the last step */
 } SignoriniHost;
 
