@@ -15,9 +15,10 @@ from PIL import Image
 
 CLOTH_FRONT = "#c8452f"
 CLOTH_BACK = "#e9b872"
-SOLIDS = ["#8fa7b8", "#6f8f72", "#b8a58f"]
+SOLIDS = ["#b9cbd6", "#6f8f72", "#b8a58f"]
 FLOOR = "#dcd8d0"
 SHADOW = "#b9b4ab"
+GRID = "#d0cbc2"
 SKY_TOP, SKY_BOTTOM = "#dfe7ee", "#f6f3ee"
 
 
@@ -69,18 +70,31 @@ def add_solid(plotter, points, faces, color):
     )
 
 
-SUN = np.array([0.45, 1.0, 0.35])  # towards the light
-
-
-def add_shadow(plotter, points, faces, floor):
+def add_shadow(plotter, points, faces, floor, sun):
     """The shadow that a mesh throws on the floor: the mesh itself, flattened along the light."""
-    flat = points - np.outer((points[:, 1] - floor) / SUN[1], SUN)
+    flat = points - np.outer((points[:, 1] - floor) / sun[1], sun)
     plotter.add_mesh(surface(flat, faces), color=SHADOW, lighting=False)
 
 
-def light_scene(plotter, centre, size):
-    directions = [(SUN, 0.75), (np.array([-1.0, 0.4, 0.9]), 0.4), (np.array([0.6, 0.1, 1.0]), 0.35)]
-    for direction, intensity in directions:
+def add_grid(plotter, size):
+    """Thin lines on the floor, half a unit apart at the scale of a metre, so that motion can be seen."""
+    step, reach, height = 0.5, 12, -1.2e-3 * size
+    for i in range(-2 * reach, 2 * reach + 1):
+        for a, b in (((i * step, -reach), (i * step, reach)), ((-reach, i * step), (reach, i * step))):
+            line = pv.Line((a[0], height, a[1]), (b[0], height, b[1]))
+            plotter.add_mesh(line, color=GRID, line_width=2, lighting=False)
+
+
+def light_directions(view):
+    """Towards the lights, in the world: sun, fill, rim. They turn with the camera about the vertical."""
+    forward = np.array([view[0], 0.0, view[2]]) / np.hypot(view[0], view[2])
+    right = np.array([-forward[2], 0.0, forward[0]])
+    directions = [(0.5, 1.0, -0.45), (-1.0, 0.35, -0.8), (0.4, 0.15, -1.0)]
+    return [a * right + np.array([0.0, b, 0.0]) + c * forward for a, b, c in directions]
+
+
+def light_scene(plotter, directions, centre, size):
+    for direction, intensity in zip(directions, (0.7, 0.38, 0.3)):
         light = pv.Light(position=centre + 4 * size * direction, focal_point=centre, intensity=intensity)
         light.positional = False
         plotter.add_light(light)
@@ -90,7 +104,8 @@ def draw(scene, window, camera, look_at, angle, centre, size, floor):
     """One frame as an array of pixels."""
     plotter = pv.Plotter(off_screen=True, lighting="none", window_size=[2 * side for side in window])
     plotter.set_background(SKY_BOTTOM, top=SKY_TOP)
-    light_scene(plotter, centre, size)
+    directions = light_directions(look_at - camera)
+    light_scene(plotter, directions, centre, size)
     solids = 0
     for name, points, faces in scene:
         if len(faces) == 0:
@@ -101,18 +116,19 @@ def draw(scene, window, camera, look_at, angle, centre, size, floor):
             add_solid(plotter, points, faces, SOLIDS[solids % len(SOLIDS)])
             solids += 1
     if floor:
+        add_grid(plotter, size)
         # A hair under y = 0, so that what lies on the floor is not drawn into it.
         ground = -2e-3 * size
         disc = pv.Disc(center=(centre[0], ground, centre[2]), inner=0.0, outer=9 * size, normal=(0, 1, 0), c_res=96)
         plotter.add_mesh(disc, color=FLOOR, lighting=False)
         for _, points, faces in scene:
             if len(faces):
-                add_shadow(plotter, points, faces, ground + 5e-4 * size)
+                add_shadow(plotter, points, faces, ground + 5e-4 * size, directions[0])
     plotter.camera.position, plotter.camera.focal_point = camera, look_at
     plotter.camera.up = (0.0, 1.0, 0.0)
     plotter.camera.view_angle = angle
     plotter.reset_camera_clipping_range()
-    plotter.enable_ssao(radius=0.05 * size, bias=0.001 * size, kernel_size=128, blur=True)
+    plotter.enable_ssao(radius=0.05 * size, bias=0.001 * size, kernel_size=64, blur=False)
     image = Image.fromarray(plotter.screenshot(return_img=True)[:, :, :3])
     plotter.close()
     # Drawn at twice the size: smooth edges on any renderer.
@@ -132,6 +148,7 @@ def main():
     parser.add_argument("--camera", type=vector, help="where the camera stands; default: a three-quarter view of all")
     parser.add_argument("--look-at", type=vector)
     parser.add_argument("--zoom", type=float, default=1.0)
+    parser.add_argument("--follow", action="store_true", help="move the camera with the middle of what is drawn")
     parser.add_argument("--floor", action="store_true", help="draw a floor at y = 0")
     arguments = parser.parse_args()
 
@@ -147,7 +164,11 @@ def main():
     rows = -(-len(scenes) // columns)
     sheet = np.full((rows * height, columns * width, 3), 255, dtype=np.uint8)
     for index, scene in enumerate(scenes):
-        image = draw(scene, (width, height), camera, look_at, 30.0 / arguments.zoom, centre, size, arguments.floor)
+        shift = np.zeros(3)
+        if arguments.follow:
+            shift = np.mean([points.mean(axis=0) for _, points, faces in scene if len(faces)], axis=0) - centre
+            shift[1] = 0.0
+        image = draw(scene, (width, height), camera + shift, look_at + shift, 30.0 / arguments.zoom, centre, size, arguments.floor)
         row, column = divmod(index, columns)
         sheet[row * height : (row + 1) * height, column * width : (column + 1) * width] = image
     Image.fromarray(sheet).save(arguments.out, optimize=True)
