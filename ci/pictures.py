@@ -128,7 +128,6 @@ def draw(scene, window, camera, look_at, angle, centre, size, floor):
     plotter.camera.up = (0.0, 1.0, 0.0)
     plotter.camera.view_angle = angle
     plotter.reset_camera_clipping_range()
-    plotter.enable_ssao(radius=0.05 * size, bias=0.001 * size, kernel_size=64, blur=False)
     image = Image.fromarray(plotter.screenshot(return_img=True)[:, :, :3])
     plotter.close()
     # Drawn at twice the size: smooth edges on any renderer.

@@ -2,7 +2,7 @@
 // swings, is let go, and both come down on the floor.
 //
 // Bullet integrates Spot with the mass properties of its mesh; Signorini owns every contact: Spot and cloth, cloth and
-// cloth, both with the floor. Every frame is certified. Writes one OBJ per frame for Blender and `sheet.txt`, the frames
+// cloth, both with the floor. Every frame is certified. Writes one OBJ a frame for Blender and `sheet.txt`, the frames
 // for a picture sheet.
 //
 //   bullet_spot_demo [--frames FOLDER] [--steps N] [--workers N] [--mesh FILE]
@@ -23,8 +23,9 @@ namespace {
 
 const double DT = 1.0 / 120.0, GRAVITY = 9.81;
 const double SPOT_MASS = 2.5, SPOT_SIZE = 0.6;
-const double RELEASE_TIME = 0.34;     // the pins let go
-const int STEPS = 192, PICTURES = 6;  // 1.6 s; pictures on the sheet
+const double RELEASE_TIME = 0.34; // the pins let go [s]
+const int STEPS = 150; // 1.25 s
+const int PICTURES[6] = {0, 30, 46, 62, 90, STEPS}; // frames on the sheet
 const double HALF_THICKNESS = 0.003;
 
 struct Options {
@@ -145,8 +146,8 @@ bool write_sheet(const Options &options)
     std::FILE *file = std::fopen((options.frames + "/sheet.txt").c_str(), "w");
     if (!file)
         return false;
-    for (int i = 1; i <= PICTURES; i++)
-        std::fprintf(file, "frame_%04d.obj\n", i * options.steps / PICTURES);
+    for (int frame : PICTURES)
+        std::fprintf(file, "frame_%04d.obj\n", std::min(frame, options.steps));
     return std::fclose(file) == 0;
 }
 
