@@ -25,7 +25,7 @@ HostCloth *make_cloth(std::uint64_t &random)
     s.columns = s.rows = 25;
     s.origin[0] = -0.6 + 0.05 * host_random(&random);
     s.origin[1] = -0.6 + 0.05 * host_random(&random);
-    s.origin[2] = -0.25;
+    s.origin[2] = -0.33;
     s.along[0] = s.across[1] = 1.2;
     s.along[2] = 0.1 * host_random(&random); // it does not strike quite flat
     s.across[2] = 0.1 * host_random(&random);
