@@ -18,6 +18,7 @@ pub struct CandidateSearch {
 /// What the present candidates were found for.
 struct Anchor {
     topology: u64,
+    filter: u64,
     x0: Vec<Vec3>,
     x1: Vec<Vec3>,
     factor: f64,
@@ -38,7 +39,7 @@ impl CandidateSearch {
         factor: f64,
         par: Par,
     ) -> &Candidates {
-        if self.anchor.as_ref().is_some_and(|anchor| anchor.holds(model, x0, x1, factor)) {
+        if self.anchor.as_ref().is_some_and(|anchor| anchor.holds(model, filter, x0, x1, factor)) {
             return &self.candidates;
         }
         let radius: Vec<f64> =
@@ -55,7 +56,13 @@ impl CandidateSearch {
             filter.allows(model.vertex_body[a as usize] as usize, model.vertex_body[b as usize] as usize)
         };
         broad_phase.candidates(&allowed, &mut self.candidates, par);
-        self.anchor = Some(Anchor { topology: model.topology_hash, x0: x0.to_vec(), x1: x1.to_vec(), factor });
+        self.anchor = Some(Anchor {
+            topology: model.topology_hash,
+            filter: filter.fingerprint(),
+            x0: x0.to_vec(),
+            x1: x1.to_vec(),
+            factor,
+        });
         &self.candidates
     }
 
@@ -68,12 +75,13 @@ impl CandidateSearch {
 }
 
 impl Anchor {
-    fn holds(&self, model: &Model, x0: &[Vec3], x1: &[Vec3], factor: f64) -> bool {
+    fn holds(&self, model: &Model, filter: &BodyFilter, x0: &[Vec3], x1: &[Vec3], factor: f64) -> bool {
         let near = |(i, (a, b)): (usize, (&Vec3, &Vec3))| {
             let margin = (factor + 0.5) * model.bodies[model.vertex_body[i] as usize].half_thickness;
             sub(*a, *b).iter().all(|d| d.abs() <= margin)
         };
         self.topology == model.topology_hash
+            && self.filter == filter.fingerprint()
             && self.factor == factor
             && self.x0 == x0
             && self.x1.len() == x1.len()

@@ -6,6 +6,7 @@ use super::pair::BodyFilter;
 use super::passing::Passing;
 use super::swept::{Hit, swept_hits};
 use crate::detection::intersection;
+use crate::geometry::{edge_edge, point_triangle};
 use crate::math::predicates::{plane_side, segment_meets_triangle};
 use crate::math::{Vec3, add_scaled, dot};
 use crate::model::{Model, State, Witness};
@@ -64,11 +65,19 @@ fn half_space_witness(model: &Model, vertex: u32, bodies: [usize; 2], point: Vec
     }
 }
 
-/// Whether an edge and a face of one surface meet in the rest shape, so that their meeting says nothing.
+/// Whether an edge and a face of one surface meet in the rest shape, so that their meeting says nothing: they cross, or
+/// one of the pairs that contacts are made of is at distance zero and never counts as contact.
 fn touches_at_rest(model: &Model, edge: [u32; 2], face: [u32; 3]) -> bool {
     let [p, q] = edge.map(|v| model.rest[v as usize]);
     let [a, b, c] = face.map(|v| model.rest[v as usize]);
+    let at_vertex = |x| point_triangle::distance_squared(x, a, b, c) == 0.0;
+    let at_edge = |u, v| edge_edge::distance_squared(p, q, u, v) == 0.0;
     segment_meets_triangle(p, q, a, b, c)
+        || at_vertex(p)
+        || at_vertex(q)
+        || at_edge(a, b)
+        || at_edge(b, c)
+        || at_edge(c, a)
 }
 
 /// Hits on straight chords from `before` to `after`: empty when nothing tunnels between two states that a host pushes.

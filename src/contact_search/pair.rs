@@ -207,6 +207,7 @@ pub struct BodyFilter {
     masks: Vec<u64>,
     collides_with_itself: Vec<bool>,
     immovable: Vec<bool>,
+    fingerprint: u64,
 }
 
 impl BodyFilter {
@@ -222,7 +223,28 @@ impl BodyFilter {
                 .map(|b| b.description.self_collision && matches!(b.description.kind, Kind::Deformable { .. }))
                 .collect(),
             immovable: model.bodies.iter().map(is_immovable).collect(),
+            fingerprint: 0,
         }
+        .with_fingerprint(model)
+    }
+
+    /// A number that changes with anything here, with the bodies' vertex ranges or with their thickness: what was found
+    /// under another one does not hold under this one.
+    #[inline]
+    pub fn fingerprint(&self) -> u64 {
+        self.fingerprint
+    }
+
+    fn with_fingerprint(mut self, model: &Model) -> BodyFilter {
+        // FNV-1a over words.
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        for (i, body) in model.bodies.iter().enumerate() {
+            let flags = u64::from(self.collides_with_itself[i]) | u64::from(self.immovable[i]) << 1;
+            let words = [self.groups[i], self.masks[i], flags, body.vertices.end as u64, body.half_thickness.to_bits()];
+            words.iter().for_each(|word| hash = (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3));
+        }
+        self.fingerprint = hash;
+        self
     }
 
     /// Whether bodies `a` and `b` may touch.

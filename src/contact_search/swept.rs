@@ -54,10 +54,10 @@ fn mesh_hit(model: &Model, passing: &Passing, pair: Pair, x0: &[Vec3], x1: &[Vec
         return None;
     }
     let (p0, p1) = (gather(vertices, x0), gather(vertices, x1));
-    let approach = relative_motion(pair.kind, &p0, &p1);
-    if approach == 0.0 {
+    if p0 == p1 {
         return None;
     }
+    let approach = relative_motion(pair.kind, &p0, &p1);
     let distance = pair.closest_points(&p0).distance_squared.sqrt();
     let [a, b] = pair.bodies(model);
     let widest = minimum_separation(model.bodies[a].half_thickness + model.bodies[b].half_thickness, distance);
@@ -81,8 +81,8 @@ fn mesh_hit(model: &Model, passing: &Passing, pair: Pair, x0: &[Vec3], x1: &[Vec
     Some(Hit { pair, time, contact })
 }
 
-/// The largest relative displacement of a vertex of one primitive against one of the other: no distance within the
-/// pair shrinks by more.
+/// The largest relative displacement of a vertex of one primitive against one of the other, and what rounding may hide
+/// of it: no distance within the pair shrinks by more.
 #[inline]
 fn relative_motion(kind: PairKind, x0: &[Vec3; 4], x1: &[Vec3; 4]) -> f64 {
     let d: [Vec3; 4] = [sub(x1[0], x0[0]), sub(x1[1], x0[1]), sub(x1[2], x0[2]), sub(x1[3], x0[3])];
@@ -91,7 +91,8 @@ fn relative_motion(kind: PairKind, x0: &[Vec3; 4], x1: &[Vec3; 4]) -> f64 {
         PairKind::EdgeEdge => between(0, 2).max(between(0, 3)).max(between(1, 2)).max(between(1, 3)),
         _ => between(0, 1).max(between(0, 2)).max(between(0, 3)),
     };
-    squared.sqrt()
+    let farthest = d.iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
+    squared.sqrt() + 8.0 * f64::EPSILON * farthest
 }
 
 fn half_space_hit(model: &Model, passing: &Passing, pair: Pair, start: &State, end: &State) -> Option<Hit> {

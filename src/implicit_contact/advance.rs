@@ -151,6 +151,7 @@ fn commit(
     std::mem::swap(state, &mut account.state);
     memory.certified = passing.is_empty().then(|| Certified {
         topology: model.topology_hash,
+        filter: filter.fingerprint(),
         positions: state.positions.clone(),
         half_spaces: state.half_spaces.clone(),
     });
@@ -174,7 +175,7 @@ fn start_state(
     report: &mut StepReport,
     par: Par,
 ) -> Result<Passing, StepError> {
-    if memory.knows(model, state) {
+    if memory.knows(model, filter, state) {
         return Ok(Passing::default());
     }
     let tangle = intersections(model, filter, state, par);

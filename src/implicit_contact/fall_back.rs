@@ -5,7 +5,7 @@ use super::manifold_refinement::{Refined, Surroundings};
 use crate::contact_search::{Hit, PairKind, Passing};
 use crate::fail_safe::{Nodes, Sweep, certified_share, hold, rigid_zones};
 use crate::math::{Vec3, add, mat_vec, sub};
-use crate::model::{Model, Segment, State, Witness};
+use crate::model::{Body, Kind, Model, Segment, State, Witness};
 
 /// What the fail-safes led to.
 pub(super) enum FallBack {
@@ -17,7 +17,7 @@ pub(super) enum FallBack {
         zones: u32,
         /// Vertices held, those of rigid bodies too.
         held_vertices: u32,
-        /// Momentum that held nodes lost `[N s]`.
+        /// Momentum that held nodes, and zones with scripted members, lost `[N s]`.
         momentum_taken: Vec3,
     },
     /// Scripted motion leaves no room beyond this share of the segment.
@@ -49,23 +49,21 @@ pub(super) fn fall_back(
     let (metric, candidates) = (around.metric, &mut scratch.candidates);
     let zones = rigid_zones(&sweep, metric, &refined.velocities, &refined.hits, candidates);
     if zones.hits.is_empty() {
+        let momentum_taken = momentum_lost(segment.model, around, &refined.velocities, &zones.velocities);
         let refined = replaced(around, refined, zones.velocities, zones.end);
         return FallBack::Resolved {
             refined: Box::new(refined),
             zones: zones.zones,
             held_vertices: 0,
-            momentum_taken: [0.0; 3],
+            momentum_taken,
         };
     }
     let holding = hold(&sweep, metric, &refined.velocities, &refined.hits, candidates);
     if holding.hits.is_empty() {
         let nodes = Nodes::new(segment.model, metric);
-        let mut momentum_taken = [0.0; 3];
+        let momentum_taken = momentum_lost(segment.model, around, &refined.velocities, &holding.velocities);
         let mut held_vertices = 0;
         for node in &holding.held {
-            let block = nodes.first_block(*node);
-            let lost = mat_vec(&metric.lumped[block], refined.velocities[block]);
-            momentum_taken = add(momentum_taken, lost);
             held_vertices += nodes.body(*node).map_or(1, |body| segment.model.bodies[body].vertices.len() as u32);
         }
         let refined = replaced(around, refined, holding.velocities, holding.end);
@@ -73,6 +71,16 @@ pub(super) fn fall_back(
     }
     let (share, state) = certified_share(&sweep, &holding.velocities, &holding.hits, candidates);
     FallBack::Pinched { share, state: Box::new(state), hits: holding.hits }
+}
+
+/// Linear momentum that movable blocks lose from `old` to `new` velocities, lumped `[N s]`: free zones keep theirs, held
+/// nodes and zones with scripted members do not.
+fn momentum_lost(model: &Model, around: &Surroundings, old: &[Vec3], new: &[Vec3]) -> Vec3 {
+    let angular = |body: &Body| matches!(body.description.kind, Kind::Rigid { .. });
+    let linear = model.bodies.iter().flat_map(|b| b.blocks.clone().take(if angular(b) { 1 } else { usize::MAX }));
+    linear.filter(|block| !around.metric.fixed[*block]).fold([0.0; 3], |sum, block| {
+        add(sum, mat_vec(&around.metric.lumped[block], sub(old[block], new[block])))
+    })
 }
 
 /// The segment with other velocities; what the fail-safe changed is booked as impulse over lumped masses.

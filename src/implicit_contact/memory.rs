@@ -1,7 +1,7 @@
 //! What the method remembers from step to step: warm starts by persistent key, and the last certified state.
 
 use super::constraint_set::ConstraintSet;
-use crate::contact_search::{Contact, ContactKey};
+use crate::contact_search::{BodyFilter, Contact, ContactKey};
 use crate::math::{Vec3, norm, scale};
 use crate::model::{HalfSpace, Model, State};
 
@@ -34,6 +34,8 @@ pub struct Memory {
 pub struct Certified {
     /// Which topology.
     pub topology: u64,
+    /// Which filter, [`BodyFilter::fingerprint`].
+    pub filter: u64,
     /// Positions of all vertices.
     pub positions: Vec<Vec3>,
     /// Half-spaces of all bodies.
@@ -54,10 +56,13 @@ impl Memory {
         }
     }
 
-    /// Whether this very state was certified.
-    pub fn knows(&self, model: &Model, state: &State) -> bool {
+    /// Whether this very state was certified, for the same topology and filter.
+    pub fn knows(&self, model: &Model, filter: &BodyFilter, state: &State) -> bool {
         self.certified.as_ref().is_some_and(|c| {
-            c.topology == model.topology_hash && c.positions == state.positions && c.half_spaces == state.half_spaces
+            c.topology == model.topology_hash
+                && c.filter == filter.fingerprint()
+                && c.positions == state.positions
+                && c.half_spaces == state.half_spaces
         })
     }
 

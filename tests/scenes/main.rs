@@ -12,3 +12,7 @@ mod invariants;
 
 mod cloth;
 mod solids;
+mod stress;
+mod stress_cases;
+mod stress_oracle;
+mod stress_scenes;
