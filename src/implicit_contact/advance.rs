@@ -8,7 +8,7 @@ use super::{Memory, SolverScratch};
 use crate::constraint::Metric;
 use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing, intersections};
 use crate::fail_safe::parts_of_step;
-use crate::math::is_finite;
+use crate::math::Vec3;
 use crate::model::{
     BuildError, Drives, Kind, Model, Segment, Settings, StartPolicy, State, StepError, StepReport, StepResult,
 };
@@ -17,6 +17,9 @@ use std::time::Instant;
 
 /// How often one part lets the pairs of a pinch pass before it counts as pinched all the same.
 const PASSES_MAX: u32 = 16;
+
+/// Coordinates and ways within a step beyond this are refused: products of three would overflow.
+const FARTHEST: f64 = 1e100;
 
 /// Buffers: capacity only, emptying it changes no bit.
 #[derive(Default)]
@@ -208,17 +211,27 @@ fn check_inputs(model: &Model, state: &State, drives: &Drives, settings: &Settin
     if drives.systems.len() != model.systems.len() {
         return fail(drives.systems.len(), 0.0, "one set of values per system");
     }
-    if let Some(i) = drives.velocities.iter().position(|v| !is_finite(*v)) {
-        return fail(i, f64::NAN, "velocity is not finite");
+    if let Some(i) = drives.velocities.iter().position(|v| !is_within_range(*v, dt)) {
+        return fail(i, largest(drives.velocities[i]), "velocity is not finite, or its way in this step out of range");
     }
-    if let Some(i) = state.positions.iter().chain(&drives.target_positions).position(|x| !is_finite(*x)) {
-        return fail(i % vertices.max(1), f64::NAN, "position is not finite");
+    let positions = || state.positions.iter().chain(&drives.target_positions);
+    if let Some((i, x)) = positions().enumerate().find(|(_, x)| !is_within_range(**x, 1.0)) {
+        return fail(i % vertices.max(1), largest(*x), "position is not finite or out of range");
     }
     let tolerances = [settings.contact_tolerance, settings.velocity_tolerance, settings.turn_max];
     if let Some(i) = tolerances.iter().position(|t| !(t.is_finite() && *t > 0.0)) {
         return fail(i, tolerances[i], "tolerance is not positive and finite");
     }
     check_poses(model, state, drives)
+}
+
+/// Whether every component times `factor` is finite and not beyond [`FARTHEST`].
+fn is_within_range(v: Vec3, factor: f64) -> bool {
+    v.iter().all(|c| (c * factor).abs() <= FARTHEST)
+}
+
+fn largest(v: Vec3) -> f64 {
+    v.iter().fold(0.0, |m: f64, c| if c.is_nan() { f64::NAN } else { m.max(c.abs()) })
 }
 
 fn check_poses(model: &Model, state: &State, drives: &Drives) -> Result<(), StepError> {
@@ -230,7 +243,7 @@ fn check_poses(model: &Model, state: &State, drives: &Drives) -> Result<(), Step
         if let Kind::HalfSpace(_) = body.description.kind {
             for h in [&state.half_spaces[index], &drives.target_half_spaces[index]] {
                 let length = crate::math::norm_squared(h.normal);
-                if !((length - 1.0).abs() < 1e-6 && h.offset.is_finite()) {
+                if !((length - 1.0).abs() < 1e-6 && h.offset.abs() <= FARTHEST) {
                     return fail("half-space normal is not a unit vector, or its offset not finite");
                 }
             }
@@ -241,7 +254,7 @@ fn check_poses(model: &Model, state: &State, drives: &Drives) -> Result<(), Step
         for pose in [&state.poses[index], &drives.target_poses[index]] {
             let length: f64 = pose.orientation.iter().map(|c| c * c).sum();
             let unit = (length - 1.0).abs() < 1e-3;
-            if !is_finite(pose.position) || !unit {
+            if !is_within_range(pose.position, 1.0) || !unit {
                 return fail("pose is not finite, or its quaternion not of unit length");
             }
         }

@@ -107,7 +107,7 @@ fn seams_of_double_vertices_are_no_intersections() {
     }
 }
 
-/// The same for a vertex that rests within its own face's plane at a distance of zero.
+/// Velocities whose way overflows are refused; whatever is taken stays finite and above the floor.
 #[test]
 fn numbers_out_of_range_are_statuses() {
     for (velocity, dt) in [(1e308, 10.0), (1e200, 1.0), (1e160, 1e-3), (-1e308, 1e-4), (1e30, 1.0)] {
@@ -234,7 +234,7 @@ fn jaws_pinch_open_and_pass() {
         }
         assert!(policy == StartPolicy::Pass || pinched > 0);
         let gap = world.state.poses[0].position[2] - world.state.poses[1].position[2];
-        assert!(gap > 0.5, "{policy:?}: opened again, {gap}");
+        assert!(gap > 0.45, "{policy:?}: opened again, {gap}");
         let speed = world.result.velocities.iter().fold(0.0, |m: f64, v| m.max(norm(*v)));
         assert!(speed < 50.0, "{policy:?}: {speed}");
     }
