@@ -154,7 +154,7 @@ fn commit(
     std::mem::swap(state, &mut account.state);
     memory.certified = passing.is_empty().then(|| Certified {
         topology: model.topology_hash,
-        filter: filter.fingerprint(),
+        filter: around.filter.fingerprint(),
         positions: state.positions.clone(),
         half_spaces: state.half_spaces.clone(),
     });
