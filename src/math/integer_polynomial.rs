@@ -271,18 +271,87 @@ impl Root {
         Some(Root::rational(BigInt::from(mantissa), u64::from(exponent.unsigned_abs())))
     }
 
-    /// Halves the interval until its width is `2^-bits` or less.
-    pub fn refine(&mut self, bits: u64) {
-        let Some((p, sign_low)) = &self.inside else { return };
-        while self.k < bits {
-            let middle: BigInt = (&self.n << 1) + 1;
-            let s = p.sign_at(&middle, self.k + 1);
-            self.k += 1;
-            if s == 0 {
-                self.n = middle;
-                self.inside = None;
-                return;
+    /// The only root of `p` inside the dyadic interval around a bracket of doubles `(a, b)`, `0 <= l <= a < b <= r <= 1`,
+    /// given that it is the only one in `[l, r]`, and simple. `None` where that interval does not fit into `[l, r]`.
+    pub fn in_bracket(p: IntegerPolynomial, (l, r): (f64, f64), (a, b): (f64, f64)) -> Option<Root> {
+        // Wider than the bracket, so that it meets at most two cells; at most 52 bits, so that doubles hold the ends.
+        let k = (-(b - a).log2().ceil() - 1.0).clamp(0.0, 52.0);
+        let cells = 2.0_f64.powi(k as i32);
+        let mut n = (a * cells).floor();
+        let k = k as u64;
+        let middle = n + 1.0;
+        if b * cells > middle {
+            let (low, high) = (p.sign_at(&BigInt::from(n as u64), k), p.sign_at(&BigInt::from(middle as u64), k));
+            if high == 0 {
+                return Some(Root::rational(BigInt::from(middle as u64), k));
             }
+            if low == high {
+                n = middle;
+            }
+        }
+        if n < l * cells || n + 1.0 > r * cells {
+            return None;
+        }
+        let n = BigInt::from(n as u64);
+        let next = &n + 1;
+        let (low, high) = (p.sign_at(&n, k), p.sign_at(&next, k));
+        if low == 0 {
+            return Some(Root::rational(n, k));
+        }
+        if high == 0 {
+            return Some(Root::rational(next, k));
+        }
+        (low != high).then_some(Root { n, k, inside: Some((p, low)) })
+    }
+
+    /// Shortens the interval to a width of `2^-bits` or less: by several bits at once where the secant predicts the
+    /// part that holds the root, by halving otherwise.
+    pub fn refine(&mut self, bits: u64) {
+        let mut step = 4;
+        while self.k < bits && self.inside.is_some() {
+            if self.skip(u64::min(step, bits - self.k)) {
+                step = u64::min(2 * step, 48);
+            } else {
+                self.halve();
+                step = 2;
+            }
+        }
+    }
+
+    /// Tries to add `j` bits at once.
+    fn skip(&mut self, j: u64) -> bool {
+        let Some((p, sign_low)) = &self.inside else { return true };
+        if j < 2 {
+            return false;
+        }
+        let next = &self.n + 1;
+        let ratio = magnitude_ratio(&p.value_at(&self.n, self.k), &p.value_at(&next, self.k));
+        let parts = 1_u64 << j;
+        let part = ((ratio * parts as f64) as u64).min(parts - 1);
+        let (low, k): (BigInt, u64) = ((&self.n << j) + part, self.k + j);
+        let high: BigInt = &low + 1;
+        let at_low = if part == 0 { *sign_low } else { p.sign_at(&low, k) };
+        let at_high = if part == parts - 1 { -*sign_low } else { p.sign_at(&high, k) };
+        if at_low == 0 || at_high == 0 {
+            *self = Root::rational(if at_low == 0 { low } else { high }, k);
+            return true;
+        }
+        if at_low != *sign_low || at_high == *sign_low {
+            return false;
+        }
+        (self.n, self.k) = (low, k);
+        true
+    }
+
+    fn halve(&mut self) {
+        let Some((p, sign_low)) = &self.inside else { return };
+        let middle: BigInt = (&self.n << 1) + 1;
+        let s = p.sign_at(&middle, self.k + 1);
+        self.k += 1;
+        if s == 0 {
+            self.n = middle;
+            self.inside = None;
+        } else {
             self.n = if s == *sign_low { middle } else { middle - 1 };
         }
     }
@@ -341,6 +410,13 @@ impl Root {
         let mantissa = mantissa.iter_u64_digits().next().unwrap_or(0) as f64;
         scale_by_power_of_two(mantissa, excess as i64 - self.k as i64)
     }
+}
+
+/// About `|a| / (|a| + |b|)`.
+fn magnitude_ratio(a: &BigInt, b: &BigInt) -> f64 {
+    let shift = a.bits().max(b.bits()).saturating_sub(62);
+    let top = |x: &BigInt| (x.magnitude() >> shift).iter_u64_digits().next().unwrap_or(0) as f64;
+    top(a) / (top(a) + top(b)).max(1.0)
 }
 
 /// `a 2^e`, rounded towards zero where subnormal, for `0 <= a < 2^53`.

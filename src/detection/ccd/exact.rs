@@ -51,6 +51,22 @@ pub(super) fn time_of_impact(shape: Shape, x0: &[Vec3; 4], x1: &[Vec3; 4], t_max
     None
 }
 
+/// What happens at one root of the coplanarity cubic.
+pub(super) enum AtRoot {
+    Apart,
+    /// Contact; the root rounded down.
+    Touching(f64),
+    /// The bracket does not do: the whole step has to be decided.
+    Unusable,
+}
+
+/// Decides contact at the only root of the cubic in `[l, r]`, simple and enclosed in `(a, b)`.
+pub(super) fn at_root(shape: Shape, x0: &[Vec3; 4], x1: &[Vec3; 4], part: (f64, f64), bracket: (f64, f64)) -> AtRoot {
+    let points = trajectories(x0, x1);
+    let Some(mut root) = Root::in_bracket(coplanarity(shape, &points), part, bracket) else { return AtRoot::Unusable };
+    if touches(shape, &points, &mut root) { AtRoot::Touching(root.lower_double()) } else { AtRoot::Apart }
+}
+
 /// The four points as integer linear polynomials, all scaled by one power of two.
 fn trajectories(x0: &[Vec3; 4], x1: &[Vec3; 4]) -> [Linear; 4] {
     let least = x0.iter().chain(x1).flatten().filter(|c| **c != 0.0).map(|c| decompose(*c).1).min().unwrap_or(0);

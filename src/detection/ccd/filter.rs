@@ -5,15 +5,16 @@
 //! 3. *Roots*: the step is divided until every part has at most one change of sign among its coefficients, so exactly
 //!    one root or none. Each root is enclosed in a short bracket, at whose ends the sign of the cubic is certain, and
 //!    the barycentric coordinates are tested over the bracket. Inside: a hit, reported at the left end of the bracket.
-//!    Outside: no contact at this root.
+//!    Outside: no contact at this root. Left open by rounding: [`super::exact`] decides at this root.
 //! 4. *Separation*: [`super::separation`] with separation zero rules out what never comes close.
-//! 5. *Integers*: [`super::exact`] decides what is left: contact at features, grazing contact, pairs that stay coplanar.
+//! 5. *Integers*: [`super::exact`] decides what is left: grazing contact, contact at an end of the step, pairs that stay
+//!    coplanar.
 //!
 //! *Work.* Parts 1 to 3 are bounded by [`MAX_PARTS`] parts and [`MAX_ITERATIONS`] evaluations for each root, part 4 by
 //! [`SEPARATION_INTERVALS`], part 5 as stated there.
 
 use super::coplanarity::{CUBIC_ERROR, Frame, axis_gap, plane_gap};
-use super::exact::{self, Shape};
+use super::exact::{self, AtRoot, Shape};
 use super::motion::{Kind, UNIT_ROUNDOFF};
 use super::separation;
 use crate::math::simd::Lanes;
@@ -64,7 +65,7 @@ pub(super) fn after_plane_test<const N: usize, K: Kind<N>>(
     t_max: f64,
 ) -> Option<f64> {
     let t_max = if t_max < 1.0 { t_max.max(0.0) } else { 1.0 };
-    match first_root_inside(K::SHAPE, frame, t_max) {
+    match first_root_inside(K::SHAPE, (x0, x1), frame, t_max) {
         Verdict::Miss => None,
         Verdict::Hit(t) => Some(t),
         Verdict::Open => {
@@ -145,7 +146,7 @@ impl Cubic {
     fn close_bracket(&self, low: f64, high: f64, t: f64, slope: f64, side: f64) -> Option<(f64, f64)> {
         let mut reach = 2.5 * self.error / slope.abs() + 2.0 * UNIT_ROUNDOFF;
         for _ in 0..4 {
-            if reach.is_nan() || reach > 0.25 * TIME_TOLERANCE {
+            if reach.is_nan() || reach > 0.25 {
                 return None;
             }
             let (a, b) = ((t - reach).max(low), (t + reach).min(high));
@@ -159,7 +160,7 @@ impl Cubic {
 }
 
 /// Walks the roots of the cubic from the left and tests contact at each.
-fn first_root_inside(shape: Shape, frame: &Frame<1>, t_max: f64) -> Verdict {
+fn first_root_inside(shape: Shape, x: (&[Vec3; 4], &[Vec3; 4]), frame: &Frame<1>, t_max: f64) -> Verdict {
     let sizes = frame.sizes().map(|s| s.0[0]);
     let product = sizes[0] * sizes[1] * sizes[2];
     if !(1e-250..1e250).contains(&product) {
@@ -177,7 +178,7 @@ fn first_root_inside(shape: Shape, frame: &Frame<1>, t_max: f64) -> Verdict {
         let signs = b.map(|b| cubic.sign(b));
         match changes(&signs) {
             Changes::None => {}
-            Changes::One => match test_root(shape, frame, &cubic, (left, right), (b[0], b[3]), &sizes) {
+            Changes::One => match test_root(shape, x, frame, &cubic, (left, right), (b[0], b[3]), &sizes) {
                 Verdict::Miss => {}
                 decided => return decided,
             },
@@ -221,21 +222,27 @@ fn changes(s: &[i32; 4]) -> Changes {
     if s[1] == s[0] || s[2] == s[3] { Changes::One } else { Changes::Unclear }
 }
 
-/// Contact at the only root in a part.
+/// Contact at the only root in a part: in floating point, and where rounding leaves it open, in integers.
 fn test_root(
     shape: Shape,
+    (x0, x1): (&[Vec3; 4], &[Vec3; 4]),
     frame: &Frame<1>,
     cubic: &Cubic,
-    (left, right): (f64, f64),
+    part: (f64, f64),
     values: (f64, f64),
     sizes: &[f64; 3],
 ) -> Verdict {
     let sign_left = cubic.sign(values.0);
-    let Some((a, b)) = cubic.bracket(left, right, values, sign_left) else { return Verdict::Open };
+    let Some((a, b)) = cubic.bracket(part.0, part.1, values, sign_left) else { return Verdict::Open };
     match inside(shape, frame, 0.5 * (a + b), 0.5 * (b - a), sizes) {
-        Some(true) if b - a < TIME_TOLERANCE => Verdict::Hit(a),
-        Some(false) => Verdict::Miss,
-        _ => Verdict::Open,
+        Some(true) if b - a < TIME_TOLERANCE => return Verdict::Hit(a),
+        Some(false) => return Verdict::Miss,
+        _ => {}
+    }
+    match exact::at_root(shape, x0, x1, part, (a, b)) {
+        AtRoot::Apart => Verdict::Miss,
+        AtRoot::Touching(t) => Verdict::Hit(t),
+        AtRoot::Unusable => Verdict::Open,
     }
 }
 
