@@ -42,6 +42,9 @@ pub(super) trait Kind<const N: usize> {
     /// The candidate directions of all feature pairs, handed to `visit` with their feature number and weight.
     /// One of them is the direction between the closest points.
     fn feature_directions(d: &[Vec3; N], visit: &mut impl FnMut(u8, Vec3, f64));
+    /// The direction of the feature pair that a plain closest-point computation names, numbered and weighted as above,
+    /// and the square of the distance it finds. Both may suffer from rounding: to be checked against each other.
+    fn closest_direction(d: &[Vec3; N]) -> (u8, Vec3, f64, f64);
 }
 
 /// Vertex-face.
@@ -88,6 +91,45 @@ impl Kind<3> for VertexFace {
             visit(4 + i as u8, *difference, norm(*difference));
         }
     }
+
+    fn closest_direction(d: &[Vec3; 3]) -> (u8, Vec3, f64, f64) {
+        // Barycentric coordinates over each edge: `b[i]` is positive where the foot of p lies beyond corner i towards i+1.
+        let edges = [sub(d[0], d[1]), sub(d[1], d[2]), sub(d[2], d[0])];
+        let normal = cross(edges[0], edges[1]);
+        let nn = norm_squared(normal);
+        // Inside of edge i where the corner differences turn the same way as the triangle.
+        let turn: [f64; 3] = std::array::from_fn(|i| dot(cross(d[i], d[(i + 1) % 3]), normal));
+        if turn[0] >= 0.0 && turn[1] >= 0.0 && turn[2] >= 0.0 && nn > 0.0 {
+            let h = dot(d[0], normal);
+            let longest = (0..3).fold(0, |b, i| if norm_squared(edges[i]) > norm_squared(edges[b]) { i } else { b });
+            let n = plane_normal(edges[longest], edges[(longest + 1) % 3]);
+            let n = if dot(n, d[0]) < 0.0 { scale(-1.0, n) } else { n };
+            return (0, n, norm(n), h * h / nn);
+        }
+        let mut best = (4, d[0], 0.0, f64::INFINITY);
+        for i in 0..3 {
+            let e = edges[i];
+            let (ee, along) = (norm_squared(e), dot(d[i], e));
+            let offset = if along <= 0.0 || ee == 0.0 {
+                d[i]
+            } else if along >= ee {
+                d[(i + 1) % 3]
+            } else {
+                add_scaled(d[i], -along / ee, e)
+            };
+            let square = norm_squared(offset);
+            if square < best.3 {
+                best = if along <= 0.0 || ee == 0.0 {
+                    (4 + i as u8, d[i], square.sqrt(), square)
+                } else if along >= ee {
+                    (4 + ((i + 1) % 3) as u8, offset, square.sqrt(), square)
+                } else {
+                    (1 + i as u8, add_scaled(offset, -dot(offset, e) / ee, e), 1.0, square)
+                };
+            }
+        }
+        best
+    }
 }
 
 impl Kind<4> for EdgeEdge {
@@ -111,6 +153,37 @@ impl Kind<4> for EdgeEdge {
             visit(5 + i as u8, *difference, norm(*difference));
         }
     }
+
+    fn closest_direction(d: &[Vec3; 4]) -> (u8, Vec3, f64, f64) {
+        // Points `d0 + s e + t f` with e along the first edge and -f along the second.
+        let (e, f) = (sub(d[2], d[0]), sub(d[1], d[0]));
+        let (ee, ff, ef) = (norm_squared(e), norm_squared(f), dot(e, f));
+        let (de, df) = (dot(d[0], e), dot(d[0], f));
+        let determinant = ee * ff - ef * ef;
+        let mut s = if determinant > 0.0 { ((ef * df - ff * de) / determinant).clamp(0.0, 1.0) } else { 0.0 };
+        let mut t = if ff > 0.0 { -(df + s * ef) / ff } else { 0.0 };
+        if !(0.0..=1.0).contains(&t) {
+            t = t.clamp(0.0, 1.0);
+            s = if ee > 0.0 { (-(de + t * ef) / ee).clamp(0.0, 1.0) } else { 0.0 };
+        }
+        let offset = add_scaled(add_scaled(d[0], s, e), t, f);
+        let square = norm_squared(offset);
+        let (end_s, end_t) = (s == 0.0 || s == 1.0, t == 0.0 || t == 1.0);
+        let (at_s, at_t) = (usize::from(s == 1.0), usize::from(t == 1.0));
+        match (end_s, end_t) {
+            (false, false) => {
+                let n = plane_normal(e, sub(d[0], d[1]));
+                let n = if dot(n, d[0]) < 0.0 { scale(-1.0, n) } else { n };
+                (0, n, norm(n), square)
+            }
+            (true, false) => (1 + at_s as u8, reject(d[2 * at_s], f), 1.0, square),
+            (false, true) => (3 + at_t as u8, reject(d[at_t], e), 1.0, square),
+            (true, true) => {
+                let k = 2 * at_s + at_t;
+                (5 + k as u8, d[k], square.sqrt(), square)
+            }
+        }
+    }
 }
 
 /// The smallest `n·D_k`.
@@ -125,7 +198,23 @@ pub(super) fn support<const N: usize>(n: Vec3, d: &[Vec3; N]) -> f64 {
 
 /// The best separating direction of a configuration: that of the closest points, up to rounding. `None` when no
 /// feature gives a finite direction (all differences vanish).
+///
+/// A plain closest-point computation comes first. Its direction is taken when it separates by the distance found:
+/// nothing can separate by more. Otherwise all features are tried.
 pub(super) fn separating_direction<const N: usize, K: Kind<N>>(d: &[Vec3; N]) -> Option<Direction> {
+    let (feature, n, weight, distance_squared) = K::closest_direction(d);
+    let length = norm(n);
+    if length > 0.0 && length.is_finite() {
+        let unit = scale(1.0 / length, n);
+        let gap = support(unit, d);
+        if gap > 0.0 && gap * gap >= distance_squared * (1.0 - 1e-9) {
+            return Some(Direction { unit, weight, feature, gap });
+        }
+    }
+    best_of_all_features::<N, K>(d)
+}
+
+fn best_of_all_features<const N: usize, K: Kind<N>>(d: &[Vec3; N]) -> Option<Direction> {
     let mut best: Option<Direction> = None;
     K::feature_directions(d, &mut |feature, n, weight| {
         let length = norm(n);

@@ -120,6 +120,7 @@ fn walk<const N: usize, K: Kind<N>>(
     let mut count = 1;
     // Whether the farthest end in the list is a time at which the pair is too close.
     let mut blocked = last.direction.gap < levels.required;
+    let mut stalled = false;
     for _ in 0..intervals {
         if count == 0 {
             return if blocked { Some(left.t) } else { None };
@@ -135,40 +136,48 @@ fn walk<const N: usize, K: Kind<N>>(
         if left.direction.gap <= levels.alarm {
             return Some(left.t);
         }
-        let (advanced, reached) = advance::<N, K>(d0, d1, &left, &right, levels);
-        let Some(advanced) = advanced else { return Some(left.t) };
-        if reached {
-            left = advanced;
-            continue;
+        if !stalled {
+            if let Some((t, fraction)) = advance(d0, d1, &left, &right, levels) {
+                let Some(advanced) = sample::<N, K>(d0, d1, t) else { return Some(left.t) };
+                // Approaching contact, the excess shrinks quickly; a pair that slides or turns at its distance keeps
+                // it, and gets on faster with a moving direction.
+                let excess = |s: &Sample<N>| s.direction.gap - levels.required;
+                stalled = fraction < 0.25 && excess(&advanced) > 0.5 * excess(&left);
+                left = advanced;
+                continue;
+            }
         }
-        if quadratic_direction_separates(&left, &advanced, &right, levels.required) {
+        stalled = false;
+        let t = left.t + 0.5 * (right.t - left.t);
+        let Some(middle) = sample::<N, K>(d0, d1, t) else { return Some(left.t) };
+        if quadratic_direction_separates(&left, &middle, &right, levels.required) {
             left = right;
             count -= 1;
             continue;
         }
-        if count == MAX_DEPTH || advanced.t <= left.t || advanced.t >= right.t {
+        if count == MAX_DEPTH || t <= left.t || t >= right.t {
             return Some(left.t);
         }
-        if advanced.direction.gap < levels.required {
+        if middle.direction.gap < levels.required {
             // Something lies in the way before this time: what comes after does not matter.
             count = 0;
             blocked = true;
         }
-        ends[count] = advanced;
+        ends[count] = middle;
         count += 1;
     }
     Some(left.t)
 }
 
-/// A sample inside the interval. `true`: everything up to it is certified by the left direction held fixed, and that
-/// is at least a quarter of the interval or leads to the alarm level. `false`: it is the middle.
-fn advance<const N: usize, K: Kind<N>>(
+/// The time inside the interval up to which the left direction, held fixed, certifies the pair, and the fraction of the
+/// interval that is. `None` when it is not inside.
+fn advance<const N: usize>(
     d0: &[Vec3; N],
     d1: &[Vec3; N],
     left: &Sample<N>,
     right: &Sample<N>,
     levels: Levels,
-) -> (Option<Sample<N>>, bool) {
+) -> Option<(f64, f64)> {
     let n = left.direction.unit;
     // Aim between what must be shown and the alarm level, so that the result is certified and counts as reached.
     let aim = 0.5 * (levels.required + levels.alarm);
@@ -179,18 +188,8 @@ fn advance<const N: usize, K: Kind<N>>(
             fraction = fraction.min((a - aim) / (a - b));
         }
     }
-    let width = right.t - left.t;
-    if fraction > 0.25 {
-        let t = left.t + fraction * width;
-        if t > left.t && t < right.t {
-            let d = differences_at(d0, d1, t);
-            if support(n, &d) >= levels.required {
-                let direction = separating_direction::<N, K>(&d);
-                return (direction.map(|direction| Sample { t, d, direction }), true);
-            }
-        }
-    }
-    (sample::<N, K>(d0, d1, left.t + 0.5 * width), false)
+    let t = left.t + fraction * (right.t - left.t);
+    (t > left.t && t < right.t && support(n, &differences_at(d0, d1, t)) >= levels.required).then_some((t, fraction))
 }
 
 /// The direction interpolated linearly between unit directions at both ends: never longer than 1.
