@@ -21,7 +21,8 @@ pub struct Motion<'a> {
     pub x0: &'a [Vec3],
     /// Positions at the end; the same slice as `x0` for a state at rest `[m]`.
     pub x1: &'a [Vec3],
-    /// Thickness of the box around each vertex, `>= 0`; empty for none `[m]`.
+    /// Thickness of the box around each vertex, `>= 0`; empty for none. The box of a primitive also contains what lies
+    /// within the interpolated thickness of its other points `[m]`.
     pub radius: &'a [f64],
 }
 

@@ -97,12 +97,23 @@ fn orientation(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> f64 {
 ///
 /// Every pair of primitives is reported on its own, also where its closest points lie on a border and belong to other
 /// pairs too; [`distinct`] leaves one of each. Nothing is missed as long as the candidates were searched with radii
-/// that add up to the tolerance of every pair. Cost: linear in the candidates.
+/// that add up to the tolerance for any two vertices of a pair. Cost: linear in the candidates.
 pub fn pairs_within(
     primitives: &Primitives,
     candidates: &Candidates,
     x: &[Vec3],
     tolerance: &Tolerance,
+    par: Par,
+) -> Vec<NearPair> {
+    among(primitives, candidates, x, &|pair| pair.distance <= tolerance(pair.kind, &pair.vertices), par)
+}
+
+/// The candidates that `keep` accepts, as near pairs.
+fn among(
+    primitives: &Primitives,
+    candidates: &Candidates,
+    x: &[Vec3],
+    keep: &(dyn Fn(&NearPair) -> bool + Sync),
     par: Par,
 ) -> Vec<NearPair> {
     let at = |v: u32| x[v as usize];
@@ -113,7 +124,7 @@ pub fn pairs_within(
             PairKind::EdgeEdge => edge_edge(a, b, c, d),
         };
         let pair = NearPair { kind, features, vertices, weights, normal, distance };
-        (distance <= tolerance(kind, &vertices)).then_some(pair)
+        keep(&pair).then_some(pair)
     };
     let first = par.map_indexed(candidates.vertex_face.len(), |i| {
         let [v, f] = candidates.vertex_face[i];
@@ -128,8 +139,9 @@ pub fn pairs_within(
     first.into_iter().chain(second).flatten().collect()
 }
 
-/// All vertex-face and edge-edge pairs at `x` that are no farther apart than the sum of their radii, the radius of a
-/// primitive being the largest of its vertices' radii `[m]`; sorted as in [`pairs_within`].
+/// All vertex-face and edge-edge pairs at `x` that are no farther apart than the sum of their radii `[m]`; sorted as in
+/// [`pairs_within`]. Between the vertices of a primitive the radius is interpolated: the sum is taken at the closest
+/// points.
 ///
 /// Refits `broad_phase`, which was built from the same primitives. Cost: `n log n` plus the candidates.
 pub fn search(
@@ -143,7 +155,7 @@ pub fn search(
     broad_phase.refit(x, x, radius, par);
     let mut candidates = Candidates::default();
     broad_phase.candidates(filter, &mut candidates, par);
-    pairs_within(primitives, &candidates, x, &|kind, v| sum_of_radii(radius, kind, v), par)
+    among(primitives, &candidates, x, &|pair| pair.distance <= sum_of_radii(radius, pair), par)
 }
 
 /// [`search`] by brute force: its oracle. Cost: quadratic.
@@ -151,17 +163,13 @@ pub fn search_brute_force(primitives: &Primitives, x: &[Vec3], radius: &[f64], f
     let everywhere = vec![f64::MAX; x.len()];
     let motion = super::Motion { x0: x, x1: x, radius: &everywhere };
     let candidates = brute_force::candidates(primitives, &motion, filter);
-    pairs_within(primitives, &candidates, x, &|kind, v| sum_of_radii(radius, kind, v), Par::Serial)
+    among(primitives, &candidates, x, &|pair| pair.distance <= sum_of_radii(radius, pair), Par::Serial)
 }
 
-/// Largest radius of the one primitive plus that of the other.
-fn sum_of_radii(radius: &[f64], kind: PairKind, vertices: &[u32; 4]) -> f64 {
-    let r = |v: u32| radius.get(v as usize).copied().unwrap_or(0.0);
-    let [a, b, c, d] = vertices.map(r);
-    match kind {
-        PairKind::VertexFace => a + b.max(c).max(d),
-        PairKind::EdgeEdge => a.max(b) + c.max(d),
-    }
+/// Radius of the one primitive plus that of the other, at the closest points.
+fn sum_of_radii(radius: &[f64], pair: &NearPair) -> f64 {
+    let at = |k: usize| pair.weights[k].abs() * radius.get(pair.vertices[k] as usize).copied().unwrap_or(0.0);
+    at(0) + at(1) + at(2) + at(3)
 }
 
 /// The vertices on which the closest points depend: those of the first primitive, and those of the second.

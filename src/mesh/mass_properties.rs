@@ -80,11 +80,11 @@ mod tests {
         let m = MassProperties::of_closed_mesh(&mesh, 6.0).unwrap();
         assert!((m.mass - 1.0).abs() < 1e-12);
         // Closed form for the corner tetrahedron: diagonal 2 (1/10 - 1/16), off the diagonal -(1/20 - 1/16).
-        for i in 0..3 {
-            assert!((m.centre[i] - origin[i] - 0.25).abs() < 1e-12);
-            for j in 0..3 {
+        assert!(m.centre.iter().zip(origin).all(|(c, o)| (c - o - 0.25).abs() < 1e-12));
+        for (i, row) in m.inertia.iter().enumerate() {
+            for (j, found) in row.iter().enumerate() {
                 let expected = if i == j { 0.075 } else { 0.0125 };
-                assert!((m.inertia[i][j] - expected).abs() < 1e-12, "{:?}", m.inertia);
+                assert!((found - expected).abs() < 1e-12, "{:?}", m.inertia);
             }
         }
         let inward = Surface::from_triangles(rest.to_vec(), faces.iter().map(|f| [f[1], f[0], f[2]]).collect());

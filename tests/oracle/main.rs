@@ -8,5 +8,6 @@ mod ccd_inclusion;
 mod ccd_separation;
 mod distance;
 mod intersection;
+mod proximity;
 mod random;
 mod scenes;
