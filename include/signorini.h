@@ -415,27 +415,27 @@
 /**
  * Free vertices, driven by the host.
  */
-#define SGN_BODY_DEFORMABLE 1
+#define SGN_BODY_KIND_DEFORMABLE 1
 
 /**
  * Rigid, driven by the host.
  */
-#define SGN_BODY_RIGID 2
+#define SGN_BODY_KIND_RIGID 2
 
 /**
  * Prescribed vertex positions.
  */
-#define SGN_BODY_KINEMATIC_MESH 3
+#define SGN_BODY_KIND_KINEMATIC_MESH 3
 
 /**
  * Prescribed poses.
  */
-#define SGN_BODY_KINEMATIC_POSED 4
+#define SGN_BODY_KIND_KINEMATIC_POSED 4
 
 /**
  * A half-space.
  */
-#define SGN_BODY_HALF_SPACE 5
+#define SGN_BODY_KIND_HALF_SPACE 5
 
 /**
  * Positions, n vectors. Push: start positions of a deformable body or a kinematic mesh. Pull: where the vertices of any
@@ -627,12 +627,47 @@
 #define SGN_STEP_TANGLED_PAIRS 8
 
 /**
+ * A vertex and a triangle.
+ */
+#define SGN_PAIR_VERTEX_FACE 0
+
+/**
+ * Two edges.
+ */
+#define SGN_PAIR_EDGE_EDGE 1
+
+/**
+ * A vertex and a half-space.
+ */
+#define SGN_PAIR_VERTEX_HALF_SPACE 2
+
+/**
+ * An edge and a triangle: of intersections, not of contacts.
+ */
+#define SGN_PAIR_EDGE_FACE 3
+
+/**
+ * No impulse.
+ */
+#define SGN_STATE_SEPARATED 0
+
+/**
+ * Held by friction.
+ */
+#define SGN_STATE_STICKING 1
+
+/**
+ * At the friction limit.
+ */
+#define SGN_STATE_SLIPPING 2
+
+/**
  * Values of the ids of the two bodies `a` and `b`, U64X2. `b` is that with the face or the half-space.
  */
 #define SGN_CONTACT_BODIES 1
 
 /**
- * Kind, U32 or U64: 0 vertex-face, 1 edge-edge, 2 vertex-half-space.
+ * Kind, U32 or U64: an `SGN_PAIR_` constant.
  */
 #define SGN_CONTACT_KIND 2
 
@@ -667,7 +702,7 @@
 #define SGN_CONTACT_IMPULSE 8
 
 /**
- * State, U32 or U64: 0 separated (no impulse), 1 sticking, 2 slipping.
+ * State, U32 or U64: an `SGN_STATE_` constant.
  */
 #define SGN_CONTACT_STATE 9
 
@@ -677,22 +712,22 @@
 #define SGN_CONTACT_KEY 10
 
 /**
- * Values of the ids of the two bodies, U64X2: of the edge or vertex, of the face or half-space.
+ * Values of the ids of the two bodies, U64X2, in the order of the kind's name.
  */
 #define SGN_WITNESS_BODIES 1
 
 /**
- * Edge and triangle, or vertex and 0, U32X2 or U64X2.
+ * Feature of each body, U32X2 or U64X2: number of vertex, edge or triangle; 0 for a half-space.
  */
 #define SGN_WITNESS_FEATURES 2
 
 /**
- * A point of the intersection, F32X3 or F64X3.
+ * A point of the intersection, or between the features, F32X3 or F64X3.
  */
 #define SGN_WITNESS_POINT 3
 
 /**
- * Kind, U32 or U64: 0 edge-triangle, 1 vertex-half-space.
+ * Kind, U32 or U64: an `SGN_PAIR_` constant.
  */
 #define SGN_WITNESS_KIND 4
 
@@ -1610,7 +1645,8 @@ typedef struct SgnCheckReport {
 } SgnCheckReport;
 
 /**
- * What of the witnesses is pulled: two features that intersect, an edge and a face or a vertex and a half-space.
+ * What of the witnesses is pulled: two features that intersect, that leave no room, or that a pushed start was swept
+ * through.
  */
 typedef int32_t SgnWitnessAttribute;
 
@@ -1834,6 +1870,16 @@ typedef struct SgnApi {
                                     const struct SgnViewMut *view,
                                     uint64_t *count);
 } SgnApi;
+
+/**
+ * Kind of a pair of features.
+ */
+typedef int32_t SgnPairKind;
+
+/**
+ * State of a contact.
+ */
+typedef int32_t SgnContactState;
 
 #ifdef __cplusplus
 extern "C" {

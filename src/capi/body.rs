@@ -333,15 +333,15 @@ unsafe impl Growing for SgnHalfSpaceDesc {
 /// Kind of a body.
 pub type SgnBodyKind = i32;
 /// Free vertices, driven by the host.
-pub const SGN_BODY_DEFORMABLE: i32 = 1;
+pub const SGN_BODY_KIND_DEFORMABLE: i32 = 1;
 /// Rigid, driven by the host.
-pub const SGN_BODY_RIGID: i32 = 2;
+pub const SGN_BODY_KIND_RIGID: i32 = 2;
 /// Prescribed vertex positions.
-pub const SGN_BODY_KINEMATIC_MESH: i32 = 3;
+pub const SGN_BODY_KIND_KINEMATIC_MESH: i32 = 3;
 /// Prescribed poses.
-pub const SGN_BODY_KINEMATIC_POSED: i32 = 4;
+pub const SGN_BODY_KIND_KINEMATIC_POSED: i32 = 4;
 /// A half-space.
-pub const SGN_BODY_HALF_SPACE: i32 = 5;
+pub const SGN_BODY_KIND_HALF_SPACE: i32 = 5;
 
 /// What a body consists of. Fill with `sgn_body_info_init`.
 #[repr(C)]
@@ -656,11 +656,11 @@ pub unsafe extern "C" fn sgn_body_info(world: *const SgnWorld, body: SgnBodyId, 
             let size = structs::checked_size(info)?;
             let found = world.body_info(body.value)?;
             let kind = match found.kind {
-                BodyKind::Deformable => SGN_BODY_DEFORMABLE,
-                BodyKind::Rigid => SGN_BODY_RIGID,
-                BodyKind::KinematicMesh => SGN_BODY_KINEMATIC_MESH,
-                BodyKind::KinematicPosed => SGN_BODY_KINEMATIC_POSED,
-                BodyKind::HalfSpace => SGN_BODY_HALF_SPACE,
+                BodyKind::Deformable => SGN_BODY_KIND_DEFORMABLE,
+                BodyKind::Rigid => SGN_BODY_KIND_RIGID,
+                BodyKind::KinematicMesh => SGN_BODY_KIND_KINEMATIC_MESH,
+                BodyKind::KinematicPosed => SGN_BODY_KIND_KINEMATIC_POSED,
+                BodyKind::HalfSpace => SGN_BODY_KIND_HALF_SPACE,
             };
             let answer = SgnBodyInfo {
                 struct_size: 0,

@@ -8,12 +8,32 @@ use super::world::SgnWorld;
 use crate::math::Vec3;
 use crate::world::World;
 
+/// Kind of a pair of features.
+pub type SgnPairKind = i32;
+/// A vertex and a triangle.
+pub const SGN_PAIR_VERTEX_FACE: i32 = 0;
+/// Two edges.
+pub const SGN_PAIR_EDGE_EDGE: i32 = 1;
+/// A vertex and a half-space.
+pub const SGN_PAIR_VERTEX_HALF_SPACE: i32 = 2;
+/// An edge and a triangle: of intersections, not of contacts.
+pub const SGN_PAIR_EDGE_FACE: i32 = 3;
+
+/// State of a contact.
+pub type SgnContactState = i32;
+/// No impulse.
+pub const SGN_STATE_SEPARATED: i32 = 0;
+/// Held by friction.
+pub const SGN_STATE_STICKING: i32 = 1;
+/// At the friction limit.
+pub const SGN_STATE_SLIPPING: i32 = 2;
+
 /// What of the contacts of the last step is pulled. All attributes have the same order, which does not depend on the
 /// executor.
 pub type SgnContactAttribute = i32;
 /// Values of the ids of the two bodies `a` and `b`, U64X2. `b` is that with the face or the half-space.
 pub const SGN_CONTACT_BODIES: i32 = 1;
-/// Kind, U32 or U64: 0 vertex-face, 1 edge-edge, 2 vertex-half-space.
+/// Kind, U32 or U64: an `SGN_PAIR_` constant.
 pub const SGN_CONTACT_KIND: i32 = 2;
 /// Feature of each body, U32X2 or U64X2: vertex and triangle, or edge and edge (as in the slot EDGES), or vertex and 0.
 pub const SGN_CONTACT_FEATURES: i32 = 3;
@@ -27,21 +47,22 @@ pub const SGN_CONTACT_NORMAL: i32 = 6;
 pub const SGN_CONTACT_DISTANCE: i32 = 7;
 /// Impulse on `a` over the step, F32X3 or F64X3; on `b` it is the opposite.
 pub const SGN_CONTACT_IMPULSE: i32 = 8;
-/// State, U32 or U64: 0 separated (no impulse), 1 sticking, 2 slipping.
+/// State, U32 or U64: an `SGN_STATE_` constant.
 pub const SGN_CONTACT_STATE: i32 = 9;
 /// Persistent key, U64: the same pair of features keeps it from step to step.
 pub const SGN_CONTACT_KEY: i32 = 10;
 
-/// What of the witnesses is pulled: two features that intersect, an edge and a face or a vertex and a half-space.
+/// What of the witnesses is pulled: two features that intersect, that leave no room, or that a pushed start was swept
+/// through.
 pub type SgnWitnessAttribute = i32;
-/// Values of the ids of the two bodies, U64X2: of the edge or vertex, of the face or half-space.
+/// Values of the ids of the two bodies, U64X2, in the order of the kind's name.
 pub const SGN_WITNESS_BODIES: i32 = 1;
-/// Edge and triangle, or vertex and 0, U32X2 or U64X2.
+/// Feature of each body, U32X2 or U64X2: number of vertex, edge or triangle; 0 for a half-space.
 pub const SGN_WITNESS_FEATURES: i32 = 2;
-/// A point of the intersection, F32X3 or F64X3.
+/// A point of the intersection, or between the features, F32X3 or F64X3.
 pub const SGN_WITNESS_POINT: i32 = 3;
 
-/// Kind, U32 or U64: 0 edge-triangle, 1 vertex-half-space.
+/// Kind, U32 or U64: an `SGN_PAIR_` constant.
 pub const SGN_WITNESS_KIND: i32 = 4;
 
 /// Outcome of a check. Fill with `sgn_check_report_init`.

@@ -8,7 +8,7 @@ use crate::detection::Candidates;
 use crate::detection::ccd::{edge_edge, point_triangle};
 use crate::math::predicates::plane_side;
 use crate::math::{Vec3, lerp, norm_squared, sub};
-use crate::model::{Model, State};
+use crate::model::{Model, State, Witness};
 use crate::parallel::Par;
 
 /// A pair that comes too close, at a fraction `time` of the segment.
@@ -20,6 +20,22 @@ pub struct Hit {
     pub time: f64,
     /// The contact with normal and weights at that time, gap at the start.
     pub contact: Contact,
+}
+
+impl Hit {
+    /// The pair as a witness, with its contact point at the positions `x`.
+    pub fn witness(&self, model: &Model, x: &[Vec3]) -> Witness {
+        Witness {
+            kind: match self.pair.kind {
+                PairKind::VertexFace => Witness::VERTEX_FACE,
+                PairKind::EdgeEdge => Witness::EDGE_EDGE,
+                PairKind::VertexHalfSpace => Witness::VERTEX_HALF_SPACE,
+            },
+            bodies: self.pair.bodies(model).map(|b| model.bodies[b].description.key),
+            features: self.pair.local_features(model),
+            point: self.contact.point(x),
+        }
+    }
 }
 
 /// All pairs that come closer than half of `min(thickness, start distance)` between `start` and `end`, in pair order.

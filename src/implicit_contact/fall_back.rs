@@ -2,7 +2,7 @@
 
 use super::Scratch;
 use super::manifold_refinement::{Refined, Surroundings};
-use crate::contact_search::{Hit, PairKind, Passing};
+use crate::contact_search::{Hit, Passing};
 use crate::fail_safe::{Nodes, Sweep, certified_share, hold, rigid_zones};
 use crate::math::{Vec3, add, mat_vec, sub};
 use crate::model::{Body, Kind, Model, Segment, State, Witness};
@@ -99,15 +99,5 @@ fn replaced(around: &Surroundings, mut refined: Refined, velocities: Vec<Vec3>, 
 
 /// Witnesses of pairs that leave no room, at the state that was reached.
 pub(super) fn witnesses(model: &Model, hits: &[Hit], state: &State) -> Vec<Witness> {
-    let witness = |hit: &Hit| Witness {
-        kind: match hit.pair.kind {
-            PairKind::VertexFace => Witness::VERTEX_FACE,
-            PairKind::EdgeEdge => Witness::EDGE_EDGE,
-            PairKind::VertexHalfSpace => Witness::VERTEX_HALF_SPACE,
-        },
-        bodies: hit.pair.bodies(model).map(|b| model.bodies[b].description.key),
-        features: hit.pair.local_features(model),
-        point: hit.contact.point(&state.positions),
-    };
-    hits.iter().map(witness).collect()
+    hits.iter().map(|hit| hit.witness(model, &state.positions)).collect()
 }

@@ -153,16 +153,13 @@ impl World {
             let tangled = intersections(&self.model, &filter, &before, par).passing;
             hits.retain(|hit| !tangled.touches(&hit.pair.vertices(&self.model)));
         }
-        let Some(first) = hits.first() else { return Ok(()) };
-        let of = |body: usize| self.bodies.id_of_key(self.model.bodies[body].description.key);
-        let [a, b] = first.pair.bodies(&self.model).map(of);
-        let [i, j] = first.pair.local_features(&self.model);
-        let message = format!(
-            "a start was pushed that comes too close to something on the way from where the last step ended ({} pairs; \
-             the first: feature {i} of body {a:#x} and feature {j} of body {b:#x}); push it as a teleport if it is one",
-            hits.len()
-        );
-        Err(WorldError::new(Fault::IntersectingStart, message).object(a).index(i as usize).value(first.time))
+        if hits.is_empty() {
+            return Ok(());
+        }
+        self.witnesses = hits.iter().map(|hit| hit.witness(&self.model, &before.positions)).collect();
+        let message = "a start was pushed that comes too close to something on the way from where the last step ended; push \
+                       it as a teleport if it is one";
+        Err(self.witnessed(WorldError::new(Fault::IntersectingStart, message)).value(hits[0].time))
     }
 
     /// Takes the end state and the results back to the bodies.

@@ -239,7 +239,7 @@ static void shapes(SgnContext *context) {
     kinematic.shape = &shape;
     OK(sgn_kinematic_create(world, &kinematic, &id));
     OK(sgn_body_info(world, id, &info));
-    CHECK(info.kind == SGN_BODY_KINEMATIC_POSED);
+    CHECK(info.kind == SGN_BODY_KIND_KINEMATIC_POSED);
     shape.kind = kind == SGN_SHAPE_CONVEX_HULL ? 99 : kind;
     shape.radius = NAN, shape.half_extents[0] = INFINITY, heights[0] = NAN;
     CHECK(sgn_rigid_create(world, &rigid, &id) == (shape.kind == 99 ? SGN_ERROR_INVALID_ARGUMENT : SGN_ERROR_NON_FINITE_INPUT));

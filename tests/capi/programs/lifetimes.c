@@ -139,6 +139,29 @@ static void re_entry(void) {
   OK(sgn_context_destroy(probe.context));
 }
 
+/* A failed call is over when its message comes: the callback may even destroy the world and the context. */
+static void destroy_on_error(void *user, SgnLogLevel level, const char *message, uint64_t length) {
+  Probe *probe = user;
+  CHECK(level == SGN_LOG_ERROR && length > 10 && memcmp(message, "sgn_", 4) == 0);
+  OK(sgn_world_destroy(probe->world));
+  OK(sgn_context_destroy(probe->context));
+  probe->calls++;
+}
+
+static void destruction_from_a_callback(void) {
+  Probe probe;
+  SgnContextDesc desc;
+  SgnBodyId garbage = {4711};
+  memset(&probe, 0, sizeof probe);
+  OK(sgn_context_desc_init(&desc, sizeof desc));
+  desc.log_callback = destroy_on_error;
+  desc.log_user = &probe;
+  OK(sgn_context_create(SGN_ABI_VERSION, &desc, NULL, 0, &probe.context));
+  OK(sgn_world_create(probe.context, NULL, &probe.world));
+  GIVES(SGN_ERROR_INVALID_ID, sgn_body_destroy(probe.world, garbage));
+  CHECK(probe.calls == 1);
+}
+
 /* Errors belong to the thread that made them. */
 static void *fail_on_thread(void *user) {
   Probe *probe = user;
@@ -245,6 +268,7 @@ static void bodies_come_and_go(void) {
 int main(void) {
   make_cloth(&cloth, 0.1, 0.5);
   re_entry();
+  destruction_from_a_callback();
   errors_by_thread();
   bodies_come_and_go();
   two_threads();

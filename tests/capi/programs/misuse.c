@@ -260,7 +260,7 @@ static void wrong_ids(void) {
   CHECK(removed.value != other.cloth.value);
   GIVES(SGN_ERROR_STALE_ID, sgn_body_info(other.world, other.cloth, &info));
   OK(sgn_body_info(other.world, removed, &info));
-  CHECK(info.kind == SGN_BODY_RIGID && info.vertices == 6 && info.triangles == 8 && info.edges == 12 && info.velocities == 1);
+  CHECK(info.kind == SGN_BODY_KIND_RIGID && info.vertices == 6 && info.triangles == 8 && info.edges == 12 && info.velocities == 1);
   OK(sgn_world_destroy(other.world));
   OK(sgn_context_destroy(other.context));
 }

@@ -188,6 +188,8 @@ static void pushes_between_steps(void) {
   hash = state_hash(s.world);
   GIVES(SGN_ERROR_INTERSECTING_START, sgn_world_step(s.world, &s.step, NULL));
   CHECK(state_hash(s.world) == hash);
+  OK(sgn_world_pull_witnesses(s.world, SGN_WITNESS_KIND, NULL, &count));
+  CHECK(count > 0);
   OK(sgn_body_push(s.world, s.cloth, SGN_SLOT_POSITION, &positions, SGN_PUSH_TELEPORT));
   CHECK(sgn_world_step(s.world, &s.step, NULL) >= 0);
   /* A small move is no jump. */

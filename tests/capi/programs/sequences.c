@@ -124,7 +124,7 @@ static void one_world(int calls) {
         uint64_t count = vertices;
         OK(sgn_body_info_init(&info, sizeof info));
         if (sgn_body_info(world, body, &info) == SGN_OK && below(10)) count = info.vertices;
-        if (count > MOST || (info.kind == SGN_BODY_RIGID && below(10))) count = 1;
+        if (count > MOST || (info.kind == SGN_BODY_KIND_RIGID && below(10))) count = 1;
         view = sgn_view(SGN_FORMAT_F64X3, n.x, count);
         if (what == SGN_SLOT_POSE || what == SGN_SLOT_TARGET_POSE) view = sgn_view(SGN_FORMAT_F64X7, n.x, 1);
         if (what == SGN_SLOT_HALF_SPACE || what == SGN_SLOT_TARGET_HALF_SPACE) view = sgn_view(SGN_FORMAT_F64X4, n.x, 1);
