@@ -3,7 +3,7 @@
 use crate::kinematics::world_inertia;
 use crate::linalg::BlockMatrix;
 use crate::math::{IDENTITY, Mat3, Vec3, ZERO_MATRIX, add, determinant, inverse, mat_scale, mat_vec, transpose};
-use crate::model::{BuildError, Drives, Kind, Model, State, StepError, System};
+use crate::model::{BuildError, Drives, Kind, Model, State, StepError, System, SystemDescription};
 use crate::parallel::Par;
 
 /// Relative asymmetry of a host matrix that is taken for rounding in `f32`.
@@ -36,10 +36,11 @@ impl Metric {
         let mut entries: Vec<(u32, u32, Mat3)> = Vec::new();
         let mut system_of = vec![u32::MAX; model.block_count];
         for (index, system) in drives.systems.iter().enumerate() {
-            let blocks = system_blocks(model, system);
-            check_values(index, system, &blocks)?;
+            let Some(description) = model.systems.get(index) else { break };
+            let blocks = system_blocks(model, description);
+            check_values(index, description, system)?;
             blocks.iter().for_each(|b| system_of[*b as usize] = index as u32);
-            system_entries(system, &blocks, &fixed, &mut entries);
+            system_entries(description, &system.values, &blocks, &fixed, &mut entries);
         }
         for (block, mass) in lumped.iter().enumerate() {
             if fixed[block] || system_of[block] == u32::MAX {
@@ -48,7 +49,7 @@ impl Metric {
         }
         let matrix = by_rows(model.block_count, entries);
         check_symmetry(&matrix)?;
-        let inverse_diagonal = inverse_blocks(model, drives, &matrix, &fixed)?;
+        let inverse_diagonal = inverse_blocks(model, &matrix, &fixed)?;
         let uncoupled = matrix.row_offsets.windows(2).map(|w| w[1] - w[0] == 1).collect();
         Ok(Metric { matrix, inverse_diagonal, lumped, fixed, uncoupled, system: system_of })
     }
@@ -106,15 +107,14 @@ fn lumped_blocks(model: &Model, state: &State) -> (Vec<Mat3>, Vec<bool>) {
 }
 
 /// Global blocks of a system, in its row order.
-fn system_blocks(model: &Model, system: &System) -> Vec<u32> {
-    let bodies = system.description.bodies.iter().filter_map(|key| model.body_index(*key));
+fn system_blocks(model: &Model, description: &SystemDescription) -> Vec<u32> {
+    let bodies = description.bodies.iter().filter_map(|key| model.body_index(*key));
     bodies.flat_map(|b| model.bodies[b].blocks.clone()).map(|b| b as u32).collect()
 }
 
-fn check_values(index: usize, system: &System, blocks: &[u32]) -> Result<(), StepError> {
+fn check_values(index: usize, description: &SystemDescription, system: &System) -> Result<(), StepError> {
     let bad = |at, value, message| Err(StepError::BadInput(BuildError { body: 0, index: at, value, message }));
-    let description = &system.description;
-    if description.row_offsets.len() != blocks.len() + 1 || system.values.len() != description.columns.len() {
+    if system.values.len() != description.columns.len() {
         return bad(index, system.values.len() as f64, "system values do not fit the pattern");
     }
     match system.values.iter().position(|m| m.iter().flatten().any(|v| !v.is_finite())) {
@@ -123,8 +123,13 @@ fn check_values(index: usize, system: &System, blocks: &[u32]) -> Result<(), Ste
     }
 }
 
-fn system_entries(system: &System, blocks: &[u32], fixed: &[bool], entries: &mut Vec<(u32, u32, Mat3)>) {
-    let description = &system.description;
+fn system_entries(
+    description: &SystemDescription,
+    values: &[Mat3],
+    blocks: &[u32],
+    fixed: &[bool],
+    entries: &mut Vec<(u32, u32, Mat3)>,
+) {
     for (row, a) in blocks.iter().enumerate() {
         for k in description.row_offsets[row]..description.row_offsets[row + 1] {
             let column = description.columns[k] as usize;
@@ -132,9 +137,9 @@ fn system_entries(system: &System, blocks: &[u32], fixed: &[bool], entries: &mut
             if fixed[*a as usize] || fixed[b as usize] {
                 continue;
             }
-            entries.push((*a, b, system.values[k]));
+            entries.push((*a, b, values[k]));
             if description.upper && row != column {
-                entries.push((b, *a, transpose(&system.values[k])));
+                entries.push((b, *a, transpose(&values[k])));
             }
         }
     }
@@ -201,27 +206,22 @@ fn is_positive_definite(m: &Mat3) -> bool {
     m[0][0] > 0.0 && m[0][0] * m[1][1] - m[0][1] * m[1][0] > 0.0 && determinant(m) > 0.0
 }
 
-fn inverse_blocks(
-    model: &Model,
-    drives: &Drives,
-    matrix: &BlockMatrix,
-    fixed: &[bool],
-) -> Result<Vec<Mat3>, StepError> {
+fn inverse_blocks(model: &Model, matrix: &BlockMatrix, fixed: &[bool]) -> Result<Vec<Mat3>, StepError> {
     let mut inverses = vec![ZERO_MATRIX; matrix.rows()];
     for block in (0..matrix.rows()).filter(|b| !fixed[*b]) {
         let diagonal = &matrix.values[matrix.diagonal[block]];
         match inverse(diagonal).filter(|_| is_positive_definite(diagonal)) {
             Some(inverse) => inverses[block] = inverse,
-            None => return Err(singular(model, drives, block)),
+            None => return Err(singular(model, block)),
         }
     }
     Ok(inverses)
 }
 
 /// Names the system and its row that own a block.
-fn singular(model: &Model, drives: &Drives, block: usize) -> StepError {
-    for (system, values) in drives.systems.iter().enumerate() {
-        if let Some(row) = system_blocks(model, values).iter().position(|b| *b as usize == block) {
+fn singular(model: &Model, block: usize) -> StepError {
+    for (system, description) in model.systems.iter().enumerate() {
+        if let Some(row) = system_blocks(model, description).iter().position(|b| *b as usize == block) {
             return StepError::SingularSystem { system, row };
         }
     }

@@ -83,7 +83,8 @@ fn run_parts(
     account: &mut StepAccount,
 ) -> Option<Vec<Hit>> {
     let settings = around.settings;
-    let mut warm = memory.clone();
+    let (contacts, velocities) = (memory.contacts.clone(), memory.velocities.clone());
+    let mut warm = Memory { contacts, dt: memory.dt, velocities, certified: None };
     let mut parts = parts_of_step(model, state, drives, settings, dt);
     let mut passes = 0;
     while let Some(part) = parts.pop() {
@@ -149,8 +150,8 @@ fn commit(
     if account.last_dt > 0.0 {
         memory.keep_contacts(model, &account.last.set, account.last_dt);
     }
-    memory.keep_velocities(model, &account.end_velocities);
     *result = account.result(model, state, dt);
+    memory.keep_velocities(model, &account.end_velocities);
     std::mem::swap(state, &mut account.state);
     memory.certified = passing.is_empty().then(|| Certified {
         topology: model.topology_hash,

@@ -82,10 +82,16 @@ impl StepAccount {
     }
 
     /// What the host pulls besides the end state.
+    ///
+    /// A pinched step ends in no part's velocity: its mean stands for it, so that no host goes on at the unconstrained one.
     pub fn result(&mut self, model: &Model, start: &State, dt: f64) -> StepResult {
+        let velocities = mean_velocities(model, start, &self.state, dt);
+        if self.report.certified_fraction < 1.0 {
+            self.end_velocities.clone_from(&velocities);
+        }
         StepResult {
-            velocities: mean_velocities(model, start, &self.state, dt),
-            end_velocities: std::mem::take(&mut self.end_velocities),
+            velocities,
+            end_velocities: self.end_velocities.clone(),
             impulses: std::mem::take(&mut self.impulses),
             contacts: contact_records(model, &self.last, &self.state),
         }

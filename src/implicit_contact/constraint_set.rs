@@ -103,11 +103,13 @@ impl ConstraintSet {
     /// Adds a row for each hit, unless a row of its pair was missed by the solver: then a tighter solve is due.
     ///
     /// A pair that is hit a second time although its rows hold gets another row, with the normal of the new impact.
+    /// Rows from number `solved` on were admitted after the solve, which cannot have missed them.
     pub fn grow(
         &mut self,
         model: &Model,
         hits: &[Hit],
         end: &[Vec3],
+        solved: usize,
         memory: &Memory,
         settings: &Settings,
         dt: f64,
@@ -119,11 +121,16 @@ impl ConstraintSet {
         for hit in hits {
             let first = by_pair.partition_point(|(pair, _)| *pair < hit.pair);
             let own = by_pair[first..].iter().take_while(|(pair, _)| *pair == hit.pair);
-            let (mut ordinal, mut missed) = (0, false);
+            let (mut ordinal, mut missed, mut fresh) = (0, false, false);
             for (_, i) in own {
+                fresh |= *i >= solved;
                 ordinal = ordinal.max(self.contacts[*i].ordinal + 1);
                 let required = self.required_gaps[*i];
                 missed |= self.contacts[*i].gap(end) < required - MISSED_SHARE * required.abs();
+            }
+            if fresh {
+                growth.added += 1;
+                continue;
             }
             if missed {
                 growth.missed += 1;

@@ -138,8 +138,9 @@ pub(super) fn refine(
             refined.set.admit(model, end, ADMITTED_SHARE, memory, settings, segment.dt);
             continue;
         }
+        let solved = refined.set.contacts.len();
         refined.set.admit(model, end, 1.0, memory, settings, segment.dt);
-        let growth = refined.set.grow(model, &refined.hits, end, memory, settings, segment.dt, tightened);
+        let growth = refined.set.grow(model, &refined.hits, end, solved, memory, settings, segment.dt, tightened);
         if growth.missed > 0 {
             tolerance_factor *= TIGHTER;
         }

@@ -97,3 +97,67 @@ impl Memory {
             + self.certified.as_ref().map_or(0, |c| 24 * c.positions.len() + 32 * c.half_spaces.len())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact_search::{Pair, PairKind, half_space_contact};
+    use crate::model::{BodyDescription, Kind, Material, Materials, Precision, Surface};
+    use std::sync::Arc;
+
+    fn model() -> Model {
+        let body = |key, surface: Surface, kind| BodyDescription {
+            key,
+            surface: Arc::new(surface),
+            kind,
+            half_thickness: Some(0.1),
+            material: 0,
+            groups: 1,
+            mask: 1,
+            self_collision: false,
+            precision: Precision::Double,
+        };
+        let point = Surface { rest: vec![[0.0; 3]], vertices: vec![0], ..Surface::default() };
+        let plane = HalfSpace { normal: [0.0, 0.0, 1.0], offset: 0.0 };
+        let bodies = vec![
+            body(1, point, Kind::Deformable { masses: vec![1.0], pinned: vec![false] }),
+            body(2, Surface::default(), Kind::HalfSpace(plane)),
+        ];
+        let material = Material { friction_coefficient: 0.5, combine_rule: Default::default() };
+        Model::build(bodies, Materials { list: vec![material], overrides: vec![] }, vec![]).unwrap()
+    }
+
+    #[test]
+    fn warm_starts_are_found_by_key_and_scaled_by_the_ratio_of_durations() {
+        let model = model();
+        let pair = Pair { kind: PairKind::VertexHalfSpace, features: [0, 1] };
+        let plane = HalfSpace { normal: [0.0, 0.0, 1.0], offset: 0.0 };
+        let contact = half_space_contact(pair, &plane, &plane, [0.0, 0.0, 0.1], 0.2);
+        let remembered =
+            RememberedContact { key: pair.key(&model, 0), impulse: [0.5, 0.0, 2.0], tangent: Some([1.0, 0.0, 0.0]) };
+        let memory = Memory { contacts: vec![remembered], dt: 0.01, ..Memory::default() };
+        let (impulse, tangent) = memory.warm_start(&model, &contact, 0.0025);
+        assert_eq!(impulse, [0.125, 0.0, 0.5]);
+        assert_eq!(tangent, Some([1.0, 0.0, 0.0]), "the frame is kept while the contact sticks");
+        let other = Contact { ordinal: 1, ..contact };
+        assert_eq!(memory.warm_start(&model, &other, 0.0025), ([0.0; 3], None));
+    }
+
+    #[test]
+    fn only_the_very_state_is_known() {
+        let model = model();
+        let mut state = model.rest_state();
+        let certified = Certified {
+            topology: model.topology_hash,
+            positions: state.positions.clone(),
+            half_spaces: state.half_spaces.clone(),
+        };
+        let memory = Memory { certified: Some(certified), ..Memory::default() };
+        assert!(memory.knows(&model, &state));
+        state.positions[0][2] = f64::MIN_POSITIVE;
+        assert!(!memory.knows(&model, &state));
+        state.positions[0][2] = 0.0;
+        state.half_spaces[1].offset = -1.0;
+        assert!(!memory.knows(&model, &state));
+    }
+}

@@ -17,6 +17,8 @@ mod inputs;
 mod momentum;
 mod pinch;
 mod resting;
+mod rows;
+mod search;
 mod spinning;
 mod tangled;
 mod thickness;

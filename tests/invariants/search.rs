@@ -1,0 +1,143 @@
+//! Contacts near the start and hits of a sweep, against brute force over all pairs and against sampling in time.
+
+use crate::world::*;
+use signorini::contact_search::{
+    BodyFilter, CandidateSearch, Contact, Pair, PairKind, Passing, gather, minimum_separation, near_contacts,
+    swept_hits,
+};
+use signorini::math::{Vec3, add, lerp, norm, sub};
+use signorini::model::{Model, State};
+use signorini::parallel::Par;
+
+/// A crumpled sheet around a ball over a half-space, and where everything wants to go.
+fn scene(seed: u64) -> (World, State) {
+    let mut jitter = Jitter(seed);
+    let mut plan = Plan::rubbing(0.3);
+    let cloth = sheet(7, 0.12);
+    plan.cloth(&cloth, moved(&cloth, [0.0, 0.0, 0.03], &mut jitter, 0.006), 0.1, &[], [0.0; 3]);
+    plan.last().self_collision = true;
+    plan.last().half_thickness = Some(0.004);
+    plan.rigid(&ball(0.03), at([0.0, 0.0, 0.07]), 1.0, diagonal(0.01), [0.0; 3], [0.0; 3]);
+    plan.last().half_thickness = Some(0.003);
+    plan.half_space([0.0, 0.0, 1.0], 0.02);
+    let world = plan.build();
+    let mut end = world.state.clone();
+    end.positions.iter_mut().for_each(|x| *x = add(*x, jitter.vector(0.03)));
+    (world, end)
+}
+
+fn all_pairs(model: &Model, filter: &BodyFilter) -> Vec<Pair> {
+    let mut pairs = Vec::new();
+    let mut take = |kind: PairKind, a: u32, b: u32| {
+        let pair = Pair { kind, features: [a, b] };
+        let v = pair.vertices(model);
+        let shares = match kind {
+            PairKind::EdgeEdge => v[2..].iter().any(|k| v[..2].contains(k)),
+            _ => v[1..].contains(&v[0]),
+        };
+        let [x, y] = pair.bodies(model);
+        if !shares && filter.allows(x, y) {
+            pairs.push(pair);
+        }
+    };
+    for v in &model.contact_vertices {
+        (0..model.faces.len()).for_each(|f| take(PairKind::VertexFace, *v, f as u32));
+    }
+    for e in 0..model.edges.len() {
+        (e + 1..model.edges.len()).for_each(|f| take(PairKind::EdgeEdge, e as u32, f as u32));
+    }
+    pairs
+}
+
+/// Vertices with weight, and the weights.
+fn stencil(vertices: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
+    let mut all: Vec<_> = vertices.into_iter().zip(weights).filter(|(_, w)| *w != 0.0).collect();
+    all.sort_unstable_by_key(|(v, _)| *v);
+    all
+}
+
+fn same(a: &[(u32, f64)], b: &[(u32, f64)]) -> bool {
+    // A reduced contact may be told from either side: signs are compared up to a common one.
+    let close = |s: f64| a.iter().zip(b).all(|((v, x), (w, y))| v == w && (x - s * y).abs() < 1e-12);
+    a.len() == b.len() && (close(1.0) || close(-1.0))
+}
+
+#[test]
+fn every_near_pair_is_covered_by_a_contact_and_every_contact_is_near() {
+    for seed in 1..5 {
+        let (world, end) = scene(seed);
+        let (model, x0) = (&world.model, &world.state.positions);
+        let filter = BodyFilter::new(model);
+        let mut search = CandidateSearch::default();
+        let candidates = search.update(model, &filter, x0, &end.positions, 1.0, Par::Serial);
+        let passing = Passing::default();
+        let contacts = near_contacts(model, &filter, &passing, candidates, &world.state, &end, 1.0, Par::Serial);
+        let mesh: Vec<&Contact> = contacts.iter().filter(|c| c.pair.kind != PairKind::VertexHalfSpace).collect();
+        let mut near = 0;
+        for pair in all_pairs(model, &filter) {
+            let vertices = pair.vertices(model);
+            let closest = pair.closest_points(&gather(vertices, x0));
+            let thickness = pair.thickness(model).unwrap();
+            if closest.distance_squared.sqrt() >= thickness {
+                continue;
+            }
+            near += 1;
+            let own = stencil(vertices, closest.weights);
+            let cover = mesh.iter().find(|c| same(&own, &stencil(c.vertices, c.weights)));
+            let cover = cover.unwrap_or_else(|| panic!("seed {seed}: {pair:?} is near and has no contact"));
+            assert!((cover.start_gap - closest.distance_squared.sqrt()).abs() < 1e-12);
+            assert!(cover.thickness >= thickness);
+        }
+        assert!(near > 20 && mesh.len() <= near);
+        for c in &contacts {
+            assert!(c.start_gap < c.thickness && (norm(c.normal) - 1.0).abs() < 1e-12);
+            assert!((c.gap(x0) - c.start_gap).abs() < 1e-12);
+        }
+        let below = model.contact_vertices.iter().filter(|v| {
+            let h = if model.vertex_body[**v as usize] == 0 { 0.004 } else { 0.003 };
+            x0[**v as usize][2] - 0.02 < h + HALF_THICKNESS
+        });
+        assert_eq!(contacts.len() - mesh.len(), below.count());
+    }
+}
+
+#[test]
+fn what_comes_too_close_at_a_sampled_time_is_hit_and_hits_are_close() {
+    let mut total = 0;
+    for seed in 1..5 {
+        let (world, end) = scene(seed);
+        let (model, x0, x1) = (&world.model, &world.state.positions, &end.positions);
+        let filter = BodyFilter::new(model);
+        let mut search = CandidateSearch::default();
+        let candidates = search.update(model, &filter, x0, x1, 1.0, Par::Serial);
+        let hits = swept_hits(model, &filter, &Passing::default(), candidates, &world.state, &end, Par::Serial);
+        let mesh: Vec<_> = hits.iter().filter(|h| h.pair.kind != PairKind::VertexHalfSpace).collect();
+        let distance = |pair: &Pair, t: f64| {
+            let v = pair.vertices(model);
+            let at: [Vec3; 4] = std::array::from_fn(|k| lerp(x0[v[k] as usize], x1[v[k] as usize], t));
+            pair.closest_points(&at).distance_squared.sqrt()
+        };
+        for pair in all_pairs(model, &filter) {
+            let separation = minimum_separation(pair.thickness(model).unwrap(), distance(&pair, 0.0));
+            let first = (0..=60).map(|i| f64::from(i) / 60.0).find(|t| distance(&pair, *t) < separation);
+            let hit = mesh.iter().find(|h| h.pair == pair);
+            if let Some(t) = first {
+                let hit = hit.unwrap_or_else(|| panic!("seed {seed}: {pair:?} is missed at {t}"));
+                assert!(hit.time <= t);
+            }
+            if let Some(hit) = hit {
+                total += 1;
+                // Conservative, and no further from the separation than the detector's stated tolerance.
+                assert!(distance(&pair, hit.time) <= separation * (1.0 + 2e-3) + 1e-12);
+                assert!(hit.contact.start_gap >= 0.0);
+            }
+        }
+        let by_plane = |v: &&u32| {
+            let h = if model.vertex_body[**v as usize] == 0 { 0.004 } else { 0.003 };
+            let gap = |x: &[Vec3]| sub(x[**v as usize], [0.0, 0.0, 0.02])[2];
+            gap(x1) < minimum_separation(h + HALF_THICKNESS, gap(x0))
+        };
+        assert_eq!(hits.len() - mesh.len(), model.contact_vertices.iter().filter(by_plane).count());
+    }
+    assert!(total > 100);
+}
