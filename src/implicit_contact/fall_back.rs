@@ -51,12 +51,7 @@ pub(super) fn fall_back(
     if zones.hits.is_empty() {
         let momentum_taken = momentum_lost(segment.model, around, &refined.velocities, &zones.velocities);
         let refined = replaced(around, refined, zones.velocities, zones.end);
-        return FallBack::Resolved {
-            refined: Box::new(refined),
-            zones: zones.zones,
-            held_vertices: 0,
-            momentum_taken,
-        };
+        return FallBack::Resolved { refined: Box::new(refined), zones: zones.zones, held_vertices: 0, momentum_taken };
     }
     let holding = hold(&sweep, metric, &refined.velocities, &refined.hits, candidates);
     if holding.hits.is_empty() {
@@ -78,9 +73,9 @@ pub(super) fn fall_back(
 fn momentum_lost(model: &Model, around: &Surroundings, old: &[Vec3], new: &[Vec3]) -> Vec3 {
     let angular = |body: &Body| matches!(body.description.kind, Kind::Rigid { .. });
     let linear = model.bodies.iter().flat_map(|b| b.blocks.clone().take(if angular(b) { 1 } else { usize::MAX }));
-    linear.filter(|block| !around.metric.fixed[*block]).fold([0.0; 3], |sum, block| {
-        add(sum, mat_vec(&around.metric.lumped[block], sub(old[block], new[block])))
-    })
+    linear
+        .filter(|block| !around.metric.fixed[*block])
+        .fold([0.0; 3], |sum, block| add(sum, mat_vec(&around.metric.lumped[block], sub(old[block], new[block]))))
 }
 
 /// The segment with other velocities; what the fail-safe changed is booked as impulse over lumped masses.

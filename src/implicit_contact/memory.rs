@@ -147,17 +147,19 @@ mod tests {
     fn only_the_very_state_is_known() {
         let model = model();
         let mut state = model.rest_state();
+        let filter = BodyFilter::new(&model);
         let certified = Certified {
             topology: model.topology_hash,
+            filter: filter.fingerprint(),
             positions: state.positions.clone(),
             half_spaces: state.half_spaces.clone(),
         };
         let memory = Memory { certified: Some(certified), ..Memory::default() };
-        assert!(memory.knows(&model, &state));
+        assert!(memory.knows(&model, &filter, &state));
         state.positions[0][2] = f64::MIN_POSITIVE;
-        assert!(!memory.knows(&model, &state));
+        assert!(!memory.knows(&model, &filter, &state));
         state.positions[0][2] = 0.0;
         state.half_spaces[1].offset = -1.0;
-        assert!(!memory.knows(&model, &state));
+        assert!(!memory.knows(&model, &filter, &state));
     }
 }

@@ -166,7 +166,14 @@ impl Runner<'_> {
         )
     }
 
-    fn check(&self, before: &State, drives: &Drives, report: &StepReport, pinched: bool, clean_start: bool) -> Vec<String> {
+    fn check(
+        &self,
+        before: &State,
+        drives: &Drives,
+        report: &StepReport,
+        pinched: bool,
+        clean_start: bool,
+    ) -> Vec<String> {
         let mut faults = Vec::new();
         let (model, result) = (&self.scene.model, &self.result);
         let (x0, x1) = (&before.positions, &self.state.positions);
@@ -184,7 +191,12 @@ impl Runner<'_> {
             // Pairs that touch at rest are out of the promise, and so is what they let through.
             let excused = |e: u32, f: u32| touches_at_rest(model, e, f);
             if let Some(p) = pierced.iter().find(|p| !excused(p[0], p[1])) {
-                faults.push(format!("INTERSECTS: edge {} face {} ({} in all), report {report:?}", p[0], p[1], pierced.len()));
+                faults.push(format!(
+                    "INTERSECTS: edge {} face {} ({} in all), report {report:?}",
+                    p[0],
+                    p[1],
+                    pierced.len()
+                ));
             }
             if oracle::below_planes(model, &self.state) > oracle::below_planes(model, before) {
                 faults.push("below a half-space".into());
@@ -204,7 +216,8 @@ impl Runner<'_> {
                     continue;
                 }
                 let d0 = oracle::distance(&pair, x0);
-                let relative = moved.iter().fold(0.0, |m: f64, a| moved.iter().fold(m, |m, b| m.max(norm(sub(*a, *b)))));
+                let relative =
+                    moved.iter().fold(0.0, |m: f64, a| moved.iter().fold(m, |m, b| m.max(norm(sub(*a, *b)))));
                 if d0 > 2.1 * relative + slack {
                     continue;
                 }
@@ -230,7 +243,14 @@ impl Runner<'_> {
         faults
     }
 
-    fn check_balances(&self, before: &State, drives: &Drives, report: &StepReport, pinched: bool, faults: &mut Vec<String>) {
+    fn check_balances(
+        &self,
+        before: &State,
+        drives: &Drives,
+        report: &StepReport,
+        pinched: bool,
+        faults: &mut Vec<String>,
+    ) {
         let (scene, model, result) = (self.scene, &self.scene.model, &self.result);
         let (x0, x1) = (&before.positions, &self.state.positions);
         let mut rounding = 0.0;
@@ -288,8 +308,13 @@ impl Runner<'_> {
             // Where nothing moves the solver's scale of velocities is 1.
             let per_step = if fastest < 1e-3 { 1.0 } else { 0.0 };
             let turning = scene.parts.iter().any(|p| norm(p.spin) > 0.0);
-            if after > free * (1.0 + if turning { 0.05 } else { 0.02 }) + rounding * fastest + 1e-6 * total_mass * per_step {
-                faults.push(format!("ENERGY: {free:e} -> {after:e} zones {} held {}", report.rigid_zones, report.held_vertices));
+            if after
+                > free * (1.0 + if turning { 0.05 } else { 0.02 }) + rounding * fastest + 1e-6 * total_mass * per_step
+            {
+                faults.push(format!(
+                    "ENERGY: {free:e} -> {after:e} zones {} held {}",
+                    report.rigid_zones, report.held_vertices
+                ));
             }
         }
     }
@@ -314,7 +339,9 @@ fn scripted_moves(scene: &Scene, body: usize, before: &State, drives: &Drives) -
     let b = &scene.model.bodies[body];
     match &b.description.kind {
         Kind::Kinematic { posed: true } => drives.target_poses[body] != before.poses[body],
-        Kind::Kinematic { posed: false } => b.vertices.clone().any(|v| drives.target_positions[v] != before.positions[v]),
+        Kind::Kinematic { posed: false } => {
+            b.vertices.clone().any(|v| drives.target_positions[v] != before.positions[v])
+        }
         Kind::HalfSpace(_) => drives.target_half_spaces[body] != before.half_spaces[body],
         Kind::Deformable { pinned, .. } => {
             b.blocks.clone().zip(pinned).any(|(block, p)| *p && drives.velocities[block] != [0.0; 3])
@@ -327,7 +354,10 @@ fn run(seed: u64, pools: &[Pool], tally: &mut Tally) {
     let scene = scene(seed);
     if std::env::var("SIGNORINI_STRESS_TRACE").is_ok() {
         let thickness: Vec<f64> = scene.model.bodies.iter().map(|b| b.half_thickness).collect();
-        println!("{} dt {:e} length {:e} stiffness {:e} {:?}", scene.family, scene.dt, scene.length, scene.stiffness, scene.settings);
+        println!(
+            "{} dt {:e} length {:e} stiffness {:e} {:?}",
+            scene.family, scene.dt, scene.length, scene.stiffness, scene.settings
+        );
         println!("half thickness {thickness:?}");
     }
     let mut runner = Runner {
@@ -363,8 +393,17 @@ fn pools() -> Vec<Pool> {
 fn report(tally: &Tally, runs: u64) {
     println!(
         "{runs} runs, {} steps: refused {} pinched {} singular {} bad input {} divided {} zones {} held {} not converged {} tangled {}; slowest {:?}",
-        tally.steps, tally.refused, tally.pinched, tally.singular, tally.bad_input, tally.divided, tally.zones,
-        tally.held, tally.not_converged, tally.tangled, tally.slowest
+        tally.steps,
+        tally.refused,
+        tally.pinched,
+        tally.singular,
+        tally.bad_input,
+        tally.divided,
+        tally.zones,
+        tally.held,
+        tally.not_converged,
+        tally.tangled,
+        tally.slowest
     );
 }
 

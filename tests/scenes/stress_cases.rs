@@ -3,9 +3,7 @@
 use super::stress_scenes::{Drive, Part, Scene, assemble, ball, block, cloth, plane};
 use signorini::implicit_contact::{Memory, Scratch, advance};
 use signorini::math::{Vec3, norm};
-use signorini::model::{
-    Drives, HalfSpace, Model, Settings, StartPolicy, State, StepError, StepReport, StepResult,
-};
+use signorini::model::{Drives, HalfSpace, Model, Settings, StartPolicy, State, StepError, StepReport, StepResult};
 use signorini::parallel::Par;
 
 fn settings() -> Settings {
@@ -90,8 +88,15 @@ fn certificates_do_not_outlive_their_filter() {
 fn seams_of_double_vertices_are_no_intersections() {
     // Two squares in one plane; the seam x = 0 has its own vertices on each side, and a T-junction.
     let points: Vec<Vec3> = vec![
-        [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 1.0, 0.0],
-        [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.5, 0.0],
+        [-1.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [-1.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.5, 0.0],
     ];
     let faces = vec![[0, 1, 2], [0, 2, 3], [4, 5, 8], [5, 6, 8], [8, 6, 7]];
     let scene = scene_of(vec![Part::new(points, faces, Drive::Soft)], settings(), 0.1);
@@ -134,7 +139,8 @@ fn numbers_out_of_range_are_statuses() {
 fn distances_below_the_rounding_of_the_way_are_kept() {
     for exponent in [1e-17, 1e-30, 1e-200, 1e-300] {
         for thickness in [0.0, 0.1] {
-            let mut parts = vec![triangle(0.0), Part::new(vec![[0.0, 0.0, exponent], [0.3, 0.0, 1.0]], vec![], Drive::Soft)];
+            let mut parts =
+                vec![triangle(0.0), Part::new(vec![[0.0, 0.0, exponent], [0.3, 0.0, 1.0]], vec![], Drive::Soft)];
             parts[1].edges = vec![[0, 1]];
             parts.iter_mut().for_each(|p| p.half_thickness = thickness);
             let scene = scene_of(parts, settings(), 1.0);
@@ -176,7 +182,9 @@ fn touching_starts_pass_nothing_through() {
 #[test]
 fn empty_and_lonely_models_step() {
     let point = Part::new(vec![[0.0; 3]], vec![], Drive::Soft);
-    for parts in [vec![], vec![point.clone()], vec![plane([0.0, 0.0, 1.0], -1.0)], vec![point, plane([0.0, 0.0, 1.0], -1.0)]] {
+    for parts in
+        [vec![], vec![point.clone()], vec![plane([0.0, 0.0, 1.0], -1.0)], vec![point, plane([0.0, 0.0, 1.0], -1.0)]]
+    {
         let count = parts.len();
         let scene = scene_of(parts, settings(), 0.1);
         let mut world = World::new(&scene);
@@ -245,7 +253,11 @@ fn jaws_pinch_open_and_pass() {
 fn a_piston_on_a_ball_is_pinched() {
     let mut piston = plane([0.0, 0.0, -1.0], -1.0);
     piston.period = 1;
-    let scene = scene_of(vec![plane([0.0, 0.0, 1.0], 0.0), piston, ball(0.3, 1, Drive::Rigid).at([0.0, 0.0, 0.5])], settings(), 0.01);
+    let scene = scene_of(
+        vec![plane([0.0, 0.0, 1.0], 0.0), piston, ball(0.3, 1, Drive::Rigid).at([0.0, 0.0, 0.5])],
+        settings(),
+        0.01,
+    );
     let mut world = World::new(&scene);
     let mut pinched = false;
     for step in 0..20 {
@@ -269,14 +281,16 @@ fn a_piston_on_a_ball_is_pinched() {
 /// What leaves and comes back between steps: memory goes by key, and nothing breaks.
 #[test]
 fn bodies_come_and_go() {
-    let full = || vec![cloth(4, 1.0), cloth(4, 1.0).at([0.05, 0.0, 0.03]), ball(0.2, 1, Drive::Rigid).at([0.0, 0.0, 0.3])];
+    let full =
+        || vec![cloth(4, 1.0), cloth(4, 1.0).at([0.05, 0.0, 0.03]), ball(0.2, 1, Drive::Rigid).at([0.0, 0.0, 0.3])];
     let scene = scene_of(full(), settings(), 0.01);
     let mut memory = Memory::default();
     let mut scratch = Scratch::default();
     let mut positions: Vec<(u64, Vec<Vec3>, signorini::kinematics::Pose)> = Vec::new();
     for step in 0..12_usize {
         let kept: Vec<usize> = (0..3).filter(|i| step % 4 != 3 || *i != step % 3).collect();
-        let parts: Vec<Part> = full().into_iter().enumerate().filter(|(i, _)| kept.contains(i)).map(|(_, p)| p).collect();
+        let parts: Vec<Part> =
+            full().into_iter().enumerate().filter(|(i, _)| kept.contains(i)).map(|(_, p)| p).collect();
         let mut part_scene = scene_of(parts, settings(), 0.01);
         // The keys of the full scene.
         let descriptions = part_scene.model.bodies.iter().zip(&kept).map(|(b, i)| {
@@ -299,7 +313,8 @@ fn bodies_come_and_go() {
             drives.velocities[body.blocks.start + 1] = [0.0; 3];
         }
         let (mut result, s) = (StepResult::default(), settings());
-        let outcome = advance(model, &mut state, &drives, &mut memory, &s, 0.01, &mut result, &mut scratch, Par::Serial);
+        let outcome =
+            advance(model, &mut state, &drives, &mut memory, &s, 0.01, &mut result, &mut scratch, Par::Serial);
         let report = outcome.unwrap_or_else(|e| panic!("step {step}: {e:?}"));
         assert_eq!(report.intersections, Some(0));
         for (i, body) in model.bodies.iter().enumerate() {

@@ -63,7 +63,8 @@ fn orientation(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i32 {
     let [a, b, c, d] = [a, b, c, d].map(exact);
     let minus = |p: &[BigInt; 3], q: &[BigInt; 3]| -> [BigInt; 3] { std::array::from_fn(|i| &p[i] - &q[i]) };
     let (u, v, w) = (minus(&a, &d), minus(&b, &d), minus(&c, &d));
-    let det: BigInt = &u[0] * (&v[1] * &w[2] - &v[2] * &w[1]) + &u[1] * (&v[2] * &w[0] - &v[0] * &w[2])
+    let det: BigInt = &u[0] * (&v[1] * &w[2] - &v[2] * &w[1])
+        + &u[1] * (&v[2] * &w[0] - &v[0] * &w[2])
         + &u[2] * (&v[0] * &w[1] - &v[1] * &w[0]);
     let zero = BigInt::from(0);
     if det > zero {
@@ -77,9 +78,8 @@ fn orientation(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i32 {
 
 fn boxes_overlap<const N: usize, const M: usize>(a: &[Vec3; N], b: &[Vec3; M]) -> bool {
     (0..3).all(|k| {
-        let range = |v: &[Vec3]| {
-            v.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p[k]), h.max(p[k])))
-        };
+        let range =
+            |v: &[Vec3]| v.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p[k]), h.max(p[k])));
         let (p, q) = (range(a), range(b));
         p.0 <= q.1 && q.0 <= p.1
     })

@@ -253,7 +253,17 @@ pub fn scene(seed: u64) -> Scene {
     let gravity = scale(r.pick(&[0.0, 0.01, 0.1]), [0.0, 0.0, -1.0]);
     let damping = r.pick(&[1.0, 0.9, 0.0]);
     let steps = if family == 12 { 6 } else { 12 };
-    assemble(name, parts, frictions, settings, (length, centre, dt), (gravity, damping), (stiffness, definite), steps, seed)
+    assemble(
+        name,
+        parts,
+        frictions,
+        settings,
+        (length, centre, dt),
+        (gravity, damping),
+        (stiffness, definite),
+        steps,
+        seed,
+    )
 }
 
 fn parts(family: usize, r: &mut Random) -> (&'static str, Vec<Part>) {
@@ -311,7 +321,8 @@ fn parts(family: usize, r: &mut Random) -> (&'static str, Vec<Part>) {
         }
         4 => {
             let spin = r.vector(3.0);
-            let mut solid = if r.chance(0.5) { block([0.2, 0.2, 0.2], Drive::Rigid) } else { ball(0.2, 1, Drive::Rigid) };
+            let mut solid =
+                if r.chance(0.5) { block([0.2, 0.2, 0.2], Drive::Rigid) } else { ball(0.2, 1, Drive::Rigid) };
             solid = posed(solid, r).at([0.0, 0.0, 0.4]).moving([0.0, 0.0, -0.2]);
             solid.spin = spin;
             let mut c = cloth(6, 1.0);
@@ -525,10 +536,8 @@ pub fn assemble(
             precision: if p.single { Precision::Single } else { Precision::Double },
         });
     }
-    let list = frictions
-        .iter()
-        .map(|f| Material { friction_coefficient: *f, combine_rule: CombineRule::default() })
-        .collect();
+    let list =
+        frictions.iter().map(|f| Material { friction_coefficient: *f, combine_rule: CombineRule::default() }).collect();
     let mut systems = Vec::new();
     if stiffness > 0.0 {
         systems.extend(pattern(&descriptions));
@@ -582,8 +591,11 @@ impl Scene {
     /// Values of the system: lumped masses plus springs along edges, stiff along and soft across, plus the ties.
     fn systems(&self, state: &State) -> Vec<System> {
         let Some(description) = self.model.systems.first() else { return Vec::new() };
-        let blocks: Vec<usize> =
-            description.bodies.iter().flat_map(|k| self.model.bodies[self.model.body_index(*k).unwrap()].blocks.clone()).collect();
+        let blocks: Vec<usize> = description
+            .bodies
+            .iter()
+            .flat_map(|k| self.model.bodies[self.model.body_index(*k).unwrap()].blocks.clone())
+            .collect();
         let lumped = |b: usize| -> Mat3 {
             let body = self.model.bodies.iter().position(|x| x.blocks.contains(&b)).unwrap();
             match &self.model.bodies[body].description.kind {
@@ -702,8 +714,11 @@ impl Scene {
             }
         }
         let d = &system.description;
-        let blocks: Vec<usize> =
-            d.bodies.iter().flat_map(|k| self.model.bodies[self.model.body_index(*k).unwrap()].blocks.clone()).collect();
+        let blocks: Vec<usize> = d
+            .bodies
+            .iter()
+            .flat_map(|k| self.model.bodies[self.model.body_index(*k).unwrap()].blocks.clone())
+            .collect();
         let mut sum = 0.0;
         for (row, b) in blocks.iter().enumerate().filter(|(_, b)| free[**b]) {
             for k in d.row_offsets[row]..d.row_offsets[row + 1] {
