@@ -65,7 +65,7 @@ pub(super) fn after_plane_test<const N: usize, K: Kind<N>>(
     t_max: f64,
 ) -> Option<f64> {
     let t_max = if t_max < 1.0 { t_max.max(0.0) } else { 1.0 };
-    match first_root_inside(K::SHAPE, (x0, x1), frame, t_max) {
+    match first_root_inside::<N, K>((x0, x1), frame, t_max) {
         Verdict::Miss => None,
         Verdict::Hit(t) => Some(t),
         Verdict::Open => {
@@ -160,7 +160,7 @@ impl Cubic {
 }
 
 /// Walks the roots of the cubic from the left and tests contact at each.
-fn first_root_inside(shape: Shape, x: (&[Vec3; 4], &[Vec3; 4]), frame: &Frame<1>, t_max: f64) -> Verdict {
+fn first_root_inside<const N: usize, K: Kind<N>>(x: (&[Vec3; 4], &[Vec3; 4]), frame: &Frame<1>, t_max: f64) -> Verdict {
     let sizes = frame.sizes().map(|s| s.0[0]);
     let product = sizes[0] * sizes[1] * sizes[2];
     if !(1e-250..1e250).contains(&product) {
@@ -178,11 +178,26 @@ fn first_root_inside(shape: Shape, x: (&[Vec3; 4], &[Vec3; 4]), frame: &Frame<1>
         let signs = b.map(|b| cubic.sign(b));
         match changes(&signs) {
             Changes::None => {}
-            Changes::One => match test_root(shape, x, frame, &cubic, (left, right), (b[0], b[3]), &sizes) {
+            Changes::One => match test_root(K::SHAPE, x, frame, &cubic, (left, right), (b[0], b[3]), &sizes) {
                 Verdict::Miss => {}
                 decided => return decided,
             },
-            Changes::End => return Verdict::Open,
+            Changes::End => {
+                // Coplanar at an end of the step, as parallel edges are: passed with a direction held fixed.
+                let pass = |from, to| separation::held_direction::<N, K>(x.0, x.1, from, to);
+                if signs[0] == 0 {
+                    let Some(t) = pass(left, right) else { return Verdict::Open };
+                    left = t;
+                } else if count == 1 {
+                    let Some(t) = pass(right, left) else { return Verdict::Open };
+                    ends[0] = t;
+                } else {
+                    return Verdict::Open;
+                }
+                if left < ends[count - 1] {
+                    continue;
+                }
+            }
             Changes::Unclear => {
                 if count == ends.len() {
                     return Verdict::Open;
@@ -192,7 +207,7 @@ fn first_root_inside(shape: Shape, x: (&[Vec3; 4], &[Vec3; 4]), frame: &Frame<1>
                 continue;
             }
         }
-        left = right;
+        left = ends[count - 1];
         count -= 1;
         if count == 0 {
             return Verdict::Miss;

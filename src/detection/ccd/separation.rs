@@ -80,6 +80,40 @@ pub(super) fn first_approach<const N: usize, K: Kind<N>>(
     walk::<N, K>(&d0, &d1, levels, t_max.clamp(0.0, 1.0), intervals)
 }
 
+/// How far from the time `from` towards the time `to` the direction between the closest points at `from`, held fixed,
+/// keeps the pair apart; `to` itself where it reaches that far. `None` where it shows nothing.
+pub(super) fn held_direction<const N: usize, K: Kind<N>>(
+    x0: &[Vec3; 4],
+    x1: &[Vec3; 4],
+    from: f64,
+    to: f64,
+) -> Option<f64> {
+    let (d0, d1) = (K::differences(x0), K::differences(x1));
+    let largest = largest_component(&d0).max(largest_component(&d1));
+    if !(1e-60..1e60).contains(&largest) {
+        return None;
+    }
+    let required = DIRECTION_ERROR * largest;
+    let (near, far) = (sample::<N, K>(&d0, &d1, from)?, differences_at(&d0, &d1, to));
+    let n = near.direction.unit;
+    if near.direction.gap < required {
+        return None;
+    }
+    if fixed_direction_separates(n, &near.d, &far, required) {
+        return Some(to);
+    }
+    // Half the way to where the gap closes leaves room for rounding, and for the signs that are asked for there.
+    let mut fraction = 1.0_f64;
+    for k in 0..N {
+        let (a, b) = (dot(n, near.d[k]), dot(n, far[k]));
+        if b < required {
+            fraction = fraction.min(0.5 * a / (a - b));
+        }
+    }
+    let t = from + fraction * (to - from);
+    (t != from && support(n, &differences_at(&d0, &d1, t)) >= required).then_some(t)
+}
+
 /// A power of two within a factor two of `1 / a`; 1 for zero.
 fn power_of_two_near_inverse(a: f64) -> f64 {
     if a == 0.0 {
