@@ -18,6 +18,9 @@ use std::time::Instant;
 /// How often one part lets the pairs of a pinch pass before it counts as pinched all the same.
 const PASSES_MAX: u32 = 16;
 
+/// Parts of a step, done and still to do, beyond which none is halved: bounds the work whatever `halvings_max`.
+const PARTS_MAX: u32 = 256;
+
 /// Coordinates and ways within a step beyond this are refused: products of three would overflow.
 const FARTHEST: f64 = 1e100;
 
@@ -101,7 +104,7 @@ fn run_parts(
             continue;
         }
         // (7) Fail-safes: divide, rigid zones, hold, pinched.
-        if part.depth < settings.halvings_max {
+        if part.depth < settings.halvings_max && account.report.parts + (parts.len() as u32) < PARTS_MAX {
             let [first, second] = part.halves();
             parts.extend([second, first]);
             continue;

@@ -18,6 +18,13 @@ const TIGHTEST: f64 = 1e-9;
 /// Share of the smallest thickness that a row may be missed by within the first tolerance.
 const POSITION_SHARE: f64 = 0.1;
 
+/// A step that has spent this many full solves' iterations leaves each further solve a small share of the cap: what
+/// conflicts this much is a matter for the fail-safes.
+const FULL_SOLVES: u32 = 4;
+
+/// That share is one part in this many.
+const SMALL_SHARE: u32 = 20;
+
 /// A row of a turning body whose true gap differs from the linear one by more than this share of the required gap is
 /// linearised anew.
 const LINEARISATION_SHARE: f64 = 0.02;
@@ -192,7 +199,12 @@ fn solve_round(
     let by_thickness = POSITION_SHARE * thinnest / (segment.dt * velocity_scale);
     let start = around.settings.contact_tolerance;
     let contact_tolerance = (start.min(by_thickness) * tolerance_factor).max(TIGHTEST.min(start));
+    let iterations_max = match around.settings.iterations_max {
+        max if account.iterations < max.saturating_mul(FULL_SOLVES) => max,
+        max => max.div_ceil(SMALL_SHARE),
+    };
     let settings = Settings {
+        iterations_max,
         contact_tolerance,
         velocity_tolerance: around.settings.velocity_tolerance * (contact_tolerance / start).max(1e-3),
         ..*around.settings
