@@ -135,3 +135,26 @@ fn the_repository_stands_alone() {
     assert!(files.iter().any(|f| f.path == "README.md"));
     report(files.iter().flat_map(text::foreign_paths).collect());
 }
+
+#[test]
+fn the_readme_shows_the_smallest_host_as_it_is() {
+    let readme = std::fs::read_to_string(top().join("README.md")).expect("README.md");
+    let host = std::fs::read_to_string(top().join("examples/c/minimal.c")).expect("minimal.c");
+    assert!(readme.contains(&format!("```c\n{host}```")), "README.md and examples/c/minimal.c differ");
+}
+
+#[test]
+fn links_of_documents_lead_somewhere() {
+    let documents: Vec<File> = everything().into_iter().filter(|f| f.path.ends_with(".md")).collect();
+    assert!(documents.len() > 5);
+    let mut dead = Vec::new();
+    for file in &documents {
+        let folder = top().join(&file.path).parent().expect("has a folder").to_path_buf();
+        for link in text::links(&file.text) {
+            if !folder.join(&link).exists() {
+                dead.push(format!("{}: {link}", file.path));
+            }
+        }
+    }
+    report(dead);
+}

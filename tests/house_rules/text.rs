@@ -17,9 +17,9 @@ const ROOMS: &[(&str, &[&str], &str)] = &[
     ("println", &[], "the library never prints"),
     ("eprintln", &[], "the library never prints"),
     ("dbg", &[], "the library never prints"),
-    ("process", &[], "the library never exits or aborts"),
-    ("env", &[], "the library reads no environment"),
-    ("fs", &[], "the library opens no files"),
+    ("std::process", &[], "the library never exits or aborts"),
+    ("std::env", &[], "the library reads no environment"),
+    ("std::fs", &[], "the library opens no files"),
     ("todo", &[], "left open"),
     ("unimplemented", &[], "left open"),
 ];
@@ -39,10 +39,13 @@ pub fn forbidden_names(file: &File) -> Vec<String> {
     let mut found = Vec::new();
     for (number, line) in file.text.lines().enumerate() {
         let code = code(line);
-        for word in words(&code) {
-            for (name, rooms, why) in ROOMS {
-                let hit = word == *name || (*name == "parry" && word.starts_with("parry"));
-                if hit && !rooms.iter().any(|room| file.path.starts_with(room)) {
+        for (name, rooms, why) in ROOMS {
+            let path = name.contains("::") && code.contains(name);
+            for _ in words(&code)
+                .filter(|w| w == name || (*name == "parry" && w.starts_with("parry")))
+                .chain(path.then_some(*name))
+            {
+                if !rooms.iter().any(|room| file.path.starts_with(room)) {
                     found.push(format!("{}:{}: {name}: {why}", file.path, number + 1));
                 }
             }
@@ -69,6 +72,16 @@ pub fn vague_name(file: &File) -> Option<String> {
 /// Folders that a document names between backticks, with a slash at the end.
 pub fn named_folders(text: &str) -> Vec<String> {
     text.split('`').skip(1).step_by(2).filter(|s| s.ends_with('/') && !s.contains(' ')).map(String::from).collect()
+}
+
+/// Targets of the links of a Markdown text that stay in the repository.
+pub fn links(text: &str) -> Vec<String> {
+    text.split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split(')').next())
+        .map(|target| target.split('#').next().unwrap_or_default().to_string())
+        .filter(|target| !target.is_empty() && !target.contains("://"))
+        .collect()
 }
 
 /// Keys of a bibliography.
@@ -154,6 +167,7 @@ mod tests {
     #[test]
     fn reads_folders_keys_and_citations() {
         assert_eq!(named_folders("`src/mesh/` holds `x`, `docs/`"), ["src/mesh/", "docs/"]);
+        assert_eq!(links("[a](docs/b.md#c), [d](https://e.f) and [g](#h)"), ["docs/b.md"]);
         assert_eq!(bib_keys("@article{Otaduy09,\n title={a}"), ["Otaduy09"]);
         assert_eq!(
             citations("see [Otaduy09, Eq. 7] and [Provot97] not [m/s] [u32; 2] or a[Index12x]"),
