@@ -131,15 +131,16 @@ fn system_entries(
     entries: &mut Vec<(u32, u32, Mat3)>,
 ) {
     for (row, a) in blocks.iter().enumerate() {
-        for k in description.row_offsets[row]..description.row_offsets[row + 1] {
-            let column = description.columns[k] as usize;
+        let slots = description.row_offsets[row]..description.row_offsets[row + 1];
+        for (column, value) in description.columns[slots.clone()].iter().zip(&values[slots]) {
+            let column = *column as usize;
             let b = blocks[column];
             if fixed[*a as usize] || fixed[b as usize] {
                 continue;
             }
-            entries.push((*a, b, values[k]));
+            entries.push((*a, b, *value));
             if description.upper && row != column {
-                entries.push((b, *a, transpose(&values[k])));
+                entries.push((b, *a, transpose(value)));
             }
         }
     }

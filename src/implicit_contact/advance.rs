@@ -15,7 +15,7 @@ use crate::model::{
 use crate::parallel::Par;
 use std::time::Instant;
 
-/// How often one part lets the pairs of a pinch pass before it counts as pinched all the same.
+/// How often the pairs of a pinch pass one by one before their bodies pass as a whole.
 const PASSES_MAX: u32 = 16;
 
 /// Parts of a step, done and still to do, beyond which none is halved: bounds the work whatever `halvings_max`.
@@ -114,21 +114,18 @@ fn run_parts(
         account.report.times.fail_safe += lap(&mut clock);
         match outcome {
             FallBack::Resolved { refined, zones, held_vertices, momentum_taken } => {
-                account.report.rigid_zones += zones;
-                account.report.held_vertices += held_vertices;
-                let taken = &mut account.report.momentum_taken;
-                *taken = crate::math::add_scaled(*taken, share, momentum_taken);
+                account.add_fail_safe(zones, held_vertices, share, momentum_taken);
                 account.add_part(model, around, *refined, share, segment.dt);
                 warm.keep_velocities(model, &account.end_velocities);
             }
-            FallBack::Pinched { hits, .. } if settings.start_policy == StartPolicy::Pass && passes < PASSES_MAX => {
-                passes += 1;
-                account.report.tangled_pairs += hits.len() as u32;
-                let vertices = hits.iter().flat_map(|hit| hit.pair.vertices(model));
-                vertices.for_each(|v| passing.insert(v, model.rest.len()));
-                parts.push(part);
-            }
             FallBack::Pinched { share: within, state: stopped, hits } => {
+                let passes_on = settings.start_policy == StartPolicy::Pass;
+                if passes_on && let_pass(model, &hits, passes >= PASSES_MAX, passing) {
+                    passes += 1;
+                    account.report.tangled_pairs += hits.len() as u32;
+                    parts.push(part);
+                    continue;
+                }
                 account.report.certified_fraction = part.from + within * share;
                 account.state = *stopped;
                 return Some(hits);
@@ -136,6 +133,21 @@ fn run_parts(
         }
     }
     None
+}
+
+/// The policy PASS: vertices of the pairs that leave no room, or of both their bodies, become tangled. Whether any did.
+///
+/// Ends: a body that is tangled as a whole is never hit again.
+fn let_pass(model: &Model, hits: &[Hit], whole_bodies: bool, passing: &mut Passing) -> bool {
+    let before = passing.len();
+    for hit in hits {
+        if whole_bodies {
+            let vertices = hit.pair.bodies(model).into_iter().flat_map(|b| model.bodies[b].vertices.clone());
+            vertices.for_each(|v| passing.insert(v as u32, model.rest.len()));
+        }
+        hit.pair.vertices(model).into_iter().for_each(|v| passing.insert(v, model.rest.len()));
+    }
+    passing.len() > before
 }
 
 /// Stage 8: memory, state and result, all at once.

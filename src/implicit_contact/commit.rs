@@ -63,6 +63,13 @@ impl StepAccount {
         self.last_dt = dt;
     }
 
+    /// Books what fail-safes did in a part that lasts `share` of the step.
+    pub fn add_fail_safe(&mut self, zones: u32, held_vertices: u32, share: f64, momentum_taken: Vec3) {
+        self.report.rigid_zones += zones;
+        self.report.held_vertices += held_vertices;
+        self.report.momentum_taken = add_scaled(self.report.momentum_taken, share, momentum_taken);
+    }
+
     /// The report, counts and residuals filled in.
     pub fn finished_report(&mut self) -> StepReport {
         let (report, rounds) = (&mut self.report, &self.rounds);

@@ -93,3 +93,16 @@ fn with_the_passing_policy_a_pinch_lets_its_pairs_pass_and_the_rest_keeps_apart(
     let report = jaws.close(0.0).expect("a clean step");
     assert_eq!(report.tangled_pairs, 0);
 }
+
+#[test]
+fn passing_ends_however_far_the_script_goes_in_one_step() {
+    let mut jaws = jaws(2);
+    jaws.world.settings.start_policy = StartPolicy::Pass;
+    jaws.world.settings.rounds_max = 2;
+    // Both jaws cross the cloth and each other at once.
+    let report = jaws.close(0.09).expect("passing never pinches");
+    assert_eq!(report.certified_fraction, 1.0);
+    assert!(report.tangled_pairs > 0);
+    let report = jaws.close(-0.12).expect("and out again");
+    assert_eq!(report.certified_fraction, 1.0);
+}
