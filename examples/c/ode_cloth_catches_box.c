@@ -15,8 +15,8 @@
 #define DT 0.01
 #define GRAVITY 9.81
 #define BOX_MASS 1.5
-#define STEPS 340
-#define LAST 50 /* the last half second is measured */
+#define STEPS 380
+#define LAST 100 /* the last second is measured */
 
 static const double HALF_EXTENTS[3] = {0.14, 0.1, 0.12};
 

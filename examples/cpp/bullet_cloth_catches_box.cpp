@@ -15,7 +15,7 @@
 namespace {
 
 const double DT = 0.01, GRAVITY = 9.81, BOX_MASS = 1.5;
-const int STEPS = 340, LAST = 50; // the last half second is measured
+const int STEPS = 380, LAST = 100; // the last second is measured
 const btVector3 HALF_EXTENTS(0.14, 0.1, 0.12);
 
 HostCloth *make_cloth(std::uint64_t &random)
