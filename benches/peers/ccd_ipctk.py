@@ -1,6 +1,6 @@
 """ipctk's continuous detection on the steps of benches/ccd: one JSON line per figure, CPU seconds, one thread.
 
-Usage: ccd_ipctk.py DIR...   (needs numpy and ipctk; see benches/ccd/main.rs for what a directory holds)
+Usage: ccd_ipctk.py [--tight] DIR...   (--tight: Tight Inclusion as well, minutes a scene; needs numpy and ipctk; see benches/ccd/main.rs for what a directory holds)
 pairs     misses: native loop over the candidates that do not hit (is_step_collision_free stops at the first hit);
           hits: one binding call each, the cost of a call that returns at once subtracted. At most LIMIT candidates.
 earliest  compute_collision_free_stepsize over all candidates.
@@ -73,19 +73,19 @@ def pairs(scene, name, kind, solver, call, every, mesh, v0, v1, rows_of):
 
 def main():
     ipctk.set_num_threads(1)
-    for folder in sys.argv[1:]:
+    solvers = {"additive": ipctk.AdditiveCCD()}
+    if "--tight" in sys.argv:
+        solvers["tight inclusion"] = ipctk.TightInclusionCCD(max_iterations=10000)
+    for folder in [a for a in sys.argv[1:] if a != "--tight"]:
         for scene, v0, v1, f in steps(folder):
             v0, v1, f = F(v0), F(v1), F(f)
             e = F(ipctk.edges(f))
             mesh = ipctk.CollisionMesh(v0, e, f)
             c = ipctk.Candidates()
             c.build(mesh, v0, v1, 0.0, ipctk.LBVH())
-            for name, solver in (("additive", ipctk.AdditiveCCD()), ("tight inclusion", ipctk.TightInclusionCCD(max_iterations=10000))):
-                if name == "additive":
-                    seconds, t = cpu(lambda: c.compute_collision_free_stepsize(mesh, v0, v1, 0.0, solver))
-                    out(part="earliest", scene=scene, method=name, pairs=len(c), milliseconds=seconds * 1e3, time=float(t))
-                elif len(c) > 1_000_000:
-                    continue
+            for name, solver in solvers.items():
+                seconds, t = cpu(lambda: c.compute_collision_free_stepsize(mesh, v0, v1, 0.0, solver))
+                out(part="earliest", scene=scene, method=name, pairs=len(c), milliseconds=seconds * 1e3, time=float(t))
                 pairs(scene, name, "vf", solver, solver.point_triangle_ccd, c.fv_candidates, mesh, v0, v1,
                       lambda p: [p.vertex_id, *f[p.face_id]])
                 pairs(scene, name, "ee", solver, solver.edge_edge_ccd, c.ee_candidates, mesh, v0, v1,

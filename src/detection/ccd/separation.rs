@@ -149,17 +149,21 @@ fn walk<const N: usize, K: Kind<N>>(
     if fixed_direction_separates(last.direction.unit, &left.d, &last.d, levels.required) {
         return None;
     }
-    // Right ends still to be reached, the nearest on top.
-    let mut ends = [last; MAX_DEPTH];
+    // Times still to be reached, the nearest on top, and the sample there.
+    let mut ends = [t_max; MAX_DEPTH];
     let mut count = 1;
+    let mut right = last;
     // Whether the farthest end in the list is a time at which the pair is too close.
-    let mut blocked = last.direction.gap < levels.required;
+    let mut blocked = right.direction.gap < levels.required;
     let mut stalled = false;
     for _ in 0..intervals {
         if count == 0 {
             return if blocked { Some(left.t) } else { None };
         }
-        let right = ends[count - 1];
+        if right.t != ends[count - 1] {
+            let Some(next) = sample::<N, K>(d0, d1, ends[count - 1]) else { return Some(left.t) };
+            right = next;
+        }
         if fixed_direction_separates(left.direction.unit, &left.d, &right.d, levels.required)
             || linear_direction_separates(&left, &right, levels.required)
         {
@@ -197,7 +201,8 @@ fn walk<const N: usize, K: Kind<N>>(
             count = 0;
             blocked = true;
         }
-        ends[count] = middle;
+        ends[count] = middle.t;
+        right = middle;
         count += 1;
     }
     Some(left.t)
