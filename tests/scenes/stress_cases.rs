@@ -327,7 +327,8 @@ fn bodies_come_and_go() {
 /// Work is bounded whatever the caps allow: a hopeless start, twenty halvings, and settings that are no numbers.
 #[test]
 fn hopeless_steps_end() {
-    for (halvings_max, recovery_fraction, proximity_factor) in [(20, 0.1, 1.0), (2, f64::NAN, f64::NAN), (3, 1e9, 50.0)] {
+    for (halvings_max, recovery_fraction, proximity_factor) in [(20, 0.1, 1.0), (2, f64::NAN, f64::NAN), (3, 1e9, 50.0)]
+    {
         let settings = Settings { halvings_max, recovery_fraction, proximity_factor, iterations_max: 40, ..settings() };
         let mut upper = cloth(3, 1.0);
         upper.pose.orientation = [0.0, 0.0, 0.3, f64::sqrt(0.91)];
@@ -344,4 +345,70 @@ fn hopeless_steps_end() {
             Err(error) => panic!("{error:?}"),
         }
     }
+}
+
+/// Runs under gravity from rest; the worst counts of all steps, and the speed at the end.
+fn settle(scene: &Scene, gravity: Vec3, steps: usize) -> (World, u32, u32, f64) {
+    let mut world = World::new(scene);
+    let (mut divided, mut fail_safes) = (0, 0);
+    for step in 0..steps {
+        let mut drives = scene.model.idle_drives(&world.state);
+        if step > 0 {
+            drives.velocities.clone_from(&world.result.end_velocities);
+        }
+        for body in &scene.model.bodies {
+            let angular = matches!(body.description.kind, signorini::model::Kind::Rigid { .. });
+            for b in body.blocks.clone().take(if angular { 1 } else { usize::MAX }) {
+                drives.velocities[b] = signorini::math::add_scaled(drives.velocities[b], scene.dt, gravity);
+            }
+        }
+        let outcome = world.step(&scene.model, &drives, &scene.settings, scene.dt);
+        let report = outcome.unwrap_or_else(|e| panic!("step {step}: {e:?}"));
+        assert_eq!(report.intersections, Some(0), "step {step}");
+        divided += u32::from(report.parts > 1);
+        fail_safes += report.rigid_zones + report.held_vertices;
+    }
+    let speed = world.result.velocities.iter().fold(0.0, |m: f64, v| m.max(norm(*v)));
+    (world, divided, fail_safes, speed)
+}
+
+/// A stack of sheets at rest keeps its thickness: layers do not sink into each other, no fail-safe fires.
+#[test]
+fn stacked_sheets_do_not_sink() {
+    let count = 6;
+    let mut parts: Vec<Part> = (0..count).map(|i| cloth(4, 1.0).at([0.0, 0.0, 0.021 * f64::from(i) + 0.021])).collect();
+    parts.push(plane([0.0, 0.0, 1.0], 0.0));
+    let scene = scene_of(parts, settings(), 0.01);
+    let (world, divided, fail_safes, speed) = settle(&scene, [0.0, 0.0, -9.81], 300);
+    let level = |body: usize| {
+        let range = scene.model.bodies[body].vertices.clone();
+        world.state.positions[range]
+            .iter()
+            .fold((f64::INFINITY, 0.0), |m: (f64, f64), x| (m.0.min(x[2]), m.1.max(x[2])))
+    };
+    let mut thinnest = level(0).0;
+    for body in 1..count as usize {
+        thinnest = thinnest.min(level(body).0 - level(body - 1).1);
+    }
+    println!("thinnest {thinnest:.5} of 0.02, divided {divided}, fail-safes {fail_safes}, speed {speed:.2e}");
+    assert_eq!((divided, fail_safes), (0, 0));
+    assert!(thinnest > 0.9 * 0.02, "sank to {thinnest}");
+    assert!(speed < 0.2 * 9.81 * 0.01 + 1e-3, "jitters at {speed}");
+}
+
+/// A block that sticks on a slope does not creep.
+#[test]
+fn a_sticking_block_does_not_creep() {
+    let slope: f64 = 0.2;
+    let normal = [slope.sin(), 0.0, slope.cos()];
+    let turned = [0.0, (0.5 * slope).sin(), 0.0, (0.5 * slope).cos()];
+    let centre = signorini::math::scale(0.2205, normal);
+    let parts = vec![plane(normal, 0.0), block([0.4, 0.4, 0.2], Drive::Rigid).at(centre).turned(turned)];
+    let scene = scene_of(parts, settings(), 0.01);
+    let (world, divided, fail_safes, speed) = settle(&scene, [0.0, 0.0, -9.81], 400);
+    let moved = norm(signorini::math::sub(world.state.poses[1].position, centre));
+    println!("moved {moved:.2e}, divided {divided}, fail-safes {fail_safes}, speed {speed:.2e}");
+    assert_eq!((divided, fail_safes), (0, 0));
+    assert!(moved < 5e-3, "crept by {moved}");
+    assert!(speed < 0.1 * 9.81 * 0.01, "moves at {speed}");
 }
