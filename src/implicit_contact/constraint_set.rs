@@ -91,6 +91,19 @@ impl ConstraintSet {
         count
     }
 
+    /// Whether a row asks for more than its gap at the start.
+    pub fn recovers(&self) -> bool {
+        self.contacts.iter().zip(&self.required_gaps).any(|(c, required)| *required > c.required_gap(0.0))
+    }
+
+    /// Lets every row keep just the gap of the start, and forgets the impulses that were to regain more.
+    pub fn drop_recovery(&mut self) {
+        for (contact, required) in self.contacts.iter().zip(&mut self.required_gaps) {
+            *required = contact.required_gap(0.0);
+        }
+        self.solved.fill(Solved::default());
+    }
+
     fn push(&mut self, model: &Model, contact: Contact, memory: &Memory, settings: &Settings, dt: f64) {
         let (impulse, tangent) = memory.warm_start(model, &contact, dt);
         let pushes = dot(contact.normal, impulse) > 0.0;

@@ -99,7 +99,8 @@ pub(super) fn refine(
     scratch: &mut Scratch,
     account: &mut RoundAccount,
 ) -> Refined {
-    let (model, settings, par) = (segment.model, around.settings, around.par);
+    let (model, par) = (segment.model, around.par);
+    let mut settings = *around.settings;
     let mut clock = Instant::now();
     let mut refined = Refined { velocities: segment.drives.velocities.clone(), ..Refined::default() };
     let mut linear_end = State::default();
@@ -108,8 +109,8 @@ pub(super) fn refine(
     let x0 = &segment.start.positions;
     let candidates = scratch.candidates.update(model, around.filter, x0, &linear_end.positions, factor, par);
     let near = near_contacts(model, around.filter, passing, candidates, segment.start, &linear_end, factor, par);
-    refined.set = ConstraintSet::new(model, near, memory, settings, segment.dt);
-    refined.set.admit(model, &linear_end.positions, 1.0, memory, settings, segment.dt);
+    refined.set = ConstraintSet::new(model, near, memory, &settings, segment.dt);
+    refined.set.admit(model, &linear_end.positions, 1.0, memory, &settings, segment.dt);
     account.search += lap(&mut clock);
     let scale_of_motion = fastest(x0, &linear_end.positions, segment.dt);
     let mut tolerance_factor = 1.0;
@@ -117,7 +118,7 @@ pub(super) fn refine(
     let mut clean: Option<Refined> = None;
     for _ in 0..settings.rounds_max.max(1) {
         account.rounds += 1;
-        solve_round(
+        let converged = solve_round(
             around,
             segment,
             &linear_end,
@@ -136,18 +137,28 @@ pub(super) fn refine(
         account.detection += lap(&mut clock);
         unrounded_end(segment, &refined, &mut linear_end);
         let end = &linear_end.positions;
+        if !converged && refined.set.recovers() {
+            // Nothing but recovery can ask for what has no solution: it is the first thing to go.
+            settings.recovery_fraction = 0.0;
+            clean = refined.hits.is_empty().then(|| refined.clone()).or(clean);
+            refined.set.drop_recovery();
+            refined.velocities.clone_from(&segment.drives.velocities);
+            refined.block_impulses.clear();
+            segment.end_state(&refined.velocities, 1.0, false, &mut linear_end);
+            continue;
+        }
         if refined.hits.is_empty() {
             let settled = worst_linearisation(segment, &refined, &linear_end) <= LINEARISATION_SHARE;
             if settled && !refined.set.would_admit(end, ADMITTED_SHARE) {
                 return refined;
             }
             clean = Some(refined.clone());
-            refined.set.admit(model, end, ADMITTED_SHARE, memory, settings, segment.dt);
+            refined.set.admit(model, end, ADMITTED_SHARE, memory, &settings, segment.dt);
             continue;
         }
         let solved = refined.set.contacts.len();
-        refined.set.admit(model, end, 1.0, memory, settings, segment.dt);
-        let growth = refined.set.grow(model, &refined.hits, end, solved, memory, settings, segment.dt, tightened);
+        refined.set.admit(model, end, 1.0, memory, &settings, segment.dt);
+        let growth = refined.set.grow(model, &refined.hits, end, solved, memory, &settings, segment.dt, tightened);
         if growth.missed > 0 {
             tolerance_factor *= TIGHTER;
         }
@@ -156,7 +167,8 @@ pub(super) fn refine(
     clean.unwrap_or(refined)
 }
 
-/// Steps 4.1 and 4.2: rows about the last tentative motion, constrained dynamics, new velocities.
+/// Steps 4.1 and 4.2: rows about the last tentative motion, constrained dynamics, new velocities; whether the solver
+/// met its tolerances.
 fn solve_round(
     around: &Surroundings,
     segment: &Segment,
@@ -167,7 +179,7 @@ fn solve_round(
     refined: &mut Refined,
     scratch: &mut Scratch,
     account: &mut RoundAccount,
-) {
+) -> bool {
     let mut clock = Instant::now();
     let (model, metric, unconstrained) = (segment.model, around.metric, &segment.drives.velocities);
     let about = Linearisation {
@@ -184,7 +196,7 @@ fn solve_round(
         refined.velocities.clone_from(unconstrained);
         refined.block_impulses = vec![[0.0; 3]; model.block_count];
         refined.built = built;
-        return;
+        return true;
     }
     let mut impulses = set.row_impulses(&built);
     let first = refined.block_impulses.is_empty();
@@ -230,6 +242,7 @@ fn solve_round(
         refined.velocities[block] = add(unconstrained[block], response);
     }
     account.solve += lap(&mut clock);
+    report.converged
 }
 
 /// `C^T p` per block.
