@@ -104,8 +104,8 @@ pub(super) fn held_direction<const N: usize, K: Kind<N>>(
     }
     // Half the way to where the gap closes leaves room for rounding, and for the signs that are asked for there.
     let mut fraction = 1.0_f64;
-    for k in 0..N {
-        let (a, b) = (dot(n, near.d[k]), dot(n, far[k]));
+    for (d_near, d_far) in near.d.iter().zip(&far) {
+        let (a, b) = (dot(n, *d_near), dot(n, *d_far));
         if b < required {
             fraction = fraction.min(0.5 * a / (a - b));
         }
@@ -174,16 +174,14 @@ fn walk<const N: usize, K: Kind<N>>(
         if left.direction.gap <= levels.alarm {
             return Some(left.t);
         }
-        if !stalled {
-            if let Some((t, fraction)) = advance(d0, d1, &left, &right, levels) {
-                let Some(advanced) = sample::<N, K>(d0, d1, t) else { return Some(left.t) };
-                // Approaching contact, the excess shrinks quickly; a pair that slides or turns at its distance keeps
-                // it, and gets on faster with a moving direction.
-                let excess = |s: &Sample<N>| s.direction.gap - levels.required;
-                stalled = fraction < 0.25 && excess(&advanced) > 0.5 * excess(&left);
-                left = advanced;
-                continue;
-            }
+        if !stalled && let Some((t, fraction)) = advance(d0, d1, &left, &right, levels) {
+            let Some(advanced) = sample::<N, K>(d0, d1, t) else { return Some(left.t) };
+            // Approaching contact, the excess shrinks quickly; a pair that slides or turns at its distance keeps it, and
+            // gets on faster with a moving direction.
+            let excess = |s: &Sample<N>| s.direction.gap - levels.required;
+            stalled = fraction < 0.25 && excess(&advanced) > 0.5 * excess(&left);
+            left = advanced;
+            continue;
         }
         stalled = false;
         let t = left.t + 0.5 * (right.t - left.t);
