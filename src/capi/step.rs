@@ -176,6 +176,7 @@ impl SgnStepDesc {
             proximity_factor: self.proximity_factor,
             turn_max: self.turn_max,
             certify: self.flags & SGN_STEP_CERTIFY != 0,
+            ..Settings::default()
         })
     }
 }

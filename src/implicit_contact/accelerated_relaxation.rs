@@ -1,6 +1,6 @@
 //! Accelerated projected relaxation: anticipation made consistent (block Jacobi in the prediction and in the
 //! correction), which makes an outer iteration a projected gradient step in a block-diagonal metric S >= A, and then
-//! accelerated by momentum with restarts [Nesterov83; BeckTeboulle09; ODonoghueCandes15].
+//! accelerated by momentum with restarts [Beck09; ODonoghue15].
 //!
 //! An iteration: predict `u = z + S^-1 (C^T p - A z)`, relax the contacts against `u` (which keeps this equation true
 //! while `p` changes), take `dv' = u`, extrapolate `z = dv' + beta (dv' - dv)`. One product with A per iteration: `A z`
@@ -9,8 +9,8 @@
 use super::friction::LocalMetric;
 use super::packed_contacts::PassContext;
 use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work, contact_residuals, dynamics_residual};
+use super::single_pass::{Lanes, SinglePass};
 use super::stop_test::{Ending, Run, Stagnation, StopTest, Verdict};
-use crate::linalg::SinglePrecision;
 use crate::math::{Mat3, Vec3, add, add_scaled, dot, mat_scale, mat_vec, scale, sub};
 use crate::parallel::BLOCK;
 
@@ -19,12 +19,26 @@ const FIRST_SCALE: f64 = 1.9;
 /// Iterations between two residual checks, which also renew `A dv` in double precision; between them increments go
 /// through single precision.
 const CHECK_EVERY: u32 = 10;
-/// Iterations without halving the residual after which an iteration makes more passes.
-const STAGNATION: u32 = 50;
+/// Iterations without halving the contact residual after which an iteration makes more passes. Where only the dynamics
+/// lag behind, passes would not help.
+const PASSES_STAGNATION: u32 = 50;
 /// Passes per iteration, raised on stagnation.
 const PASSES: [u32; 4] = [1, 3, 6, 12];
+/// Smallest tolerance for which passes run in single precision.
+const SINGLE_FROM: f64 = 1e-5;
 /// Of the passes, one in so many visits all contacts; the others those that are near or press.
 const FULL_PASS_EVERY: u32 = 4;
+/// How long a run may go on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Control {
+    /// Iterations at most.
+    pub iterations_max: u32,
+    /// Iterations without halving the residuals together after which the run ends as stagnated.
+    pub patience: u32,
+    /// Whether iterations make the most passes from the first on.
+    pub thorough: bool,
+}
+
 /// Sums of one product sweep.
 #[derive(Clone, Copy, Default)]
 struct Sums {
@@ -47,7 +61,6 @@ struct Node {
 
 struct Relaxation<'a, 'b> {
     task: &'b Task<'a>,
-    single: &'b SinglePrecision,
     /// Whether block row i has off-diagonal blocks; the others keep scale 1, where relaxation is exact.
     coupled: &'b [bool],
     metric_scale: f64,
@@ -60,26 +73,35 @@ struct Relaxation<'a, 'b> {
     /// `A dv'`
     a_u: Vec<Vec3>,
     p: Vec<Vec3>,
+    /// Whether passes run in single precision, on these.
+    rounded: bool,
+    single_pass: SinglePass,
+    p_single: Vec<Lanes>,
+    u_single: Vec<Lanes>,
     momentum: f64,
     near: Vec<u32>,
     work: Work,
 }
 
-/// Runs from `at` until the tolerances are met, `iterations_max`, or (with `hand_over`) the residual stagnates with the
-/// most passes; leaves the best iterate.
+/// Runs from `at` until the tolerances are met or `control` ends it; leaves the best iterate.
 pub(super) fn run(
     task: &Task,
-    single: &SinglePrecision,
     coupled: &[bool],
     at: &mut Iterate,
-    (iterations_max, hand_over): (u32, bool),
+    control: Control,
     buffers: &mut MeasureBuffers,
     work: &mut Work,
 ) -> Run {
     let blocks = at.dv.len();
+    let tolerance = task.settings.contact_tolerance.min(task.settings.velocity_tolerance);
+    let rounded = tolerance >= SINGLE_FROM;
+    let single_pass = if rounded {
+        SinglePass::new(task.packed, task.problem.rows, task.typical_mass, task.velocity_scale)
+    } else {
+        SinglePass::default()
+    };
     let mut r = Relaxation {
         task,
-        single,
         coupled,
         metric_scale: FIRST_SCALE,
         inverse: Vec::new(),
@@ -88,13 +110,17 @@ pub(super) fn run(
         u: vec![[0.0; 3]; blocks],
         a_u: vec![[0.0; 3]; blocks],
         p: Vec::new(),
+        rounded,
+        single_pass,
+        p_single: Vec::new(),
+        u_single: Vec::new(),
         momentum: 1.0,
         near: Vec::new(),
         work: Work::default(),
     };
     r.set_scale(FIRST_SCALE);
     r.restart_from(at);
-    let outcome = r.iterate(at, iterations_max, hand_over, buffers);
+    let outcome = r.iterate(at, control, buffers);
     work.blocks += r.work.blocks;
     work.contacts += r.work.contacts;
     outcome
@@ -102,11 +128,21 @@ pub(super) fn run(
 
 impl Relaxation<'_, '_> {
     fn set_scale(&mut self, s: f64) {
-        self.metric_scale = s;
+        let before = std::mem::replace(&mut self.metric_scale, s);
         let (source, coupled, par) = (self.task.problem.inverse_diagonal, self.coupled, self.task.par);
         self.inverse.resize(source.len(), [[0.0; 3]; 3]);
         par.map_into(&mut self.inverse, |b| if coupled[b] { mat_scale(1.0 / s, &source[b]) } else { source[b] });
-        self.metrics = self.task.packed.metrics(self.task.problem.rows, &self.inverse, par);
+        let packed = self.task.packed;
+        let uniform = !(0..self.coupled.len()).any(|b| !self.coupled[b] && packed.touches(b));
+        if uniform && !self.metrics.is_empty() {
+            let r = before / s;
+            self.metrics.iter_mut().for_each(|m| *m = m.scaled(r));
+        } else {
+            self.metrics = packed.metrics(self.task.problem.rows, &self.inverse, par);
+        }
+        if self.rounded {
+            self.single_pass.set_metric(&self.inverse, &self.metrics, par);
+        }
         self.work.contacts += self.metrics.len() as u64;
     }
 
@@ -114,6 +150,9 @@ impl Relaxation<'_, '_> {
     fn restart_from(&mut self, at: &Iterate) {
         let Task { problem, packed, par, .. } = *self.task;
         self.p.clone_from(&at.p);
+        if self.rounded {
+            self.p_single = self.single_pass.round_multipliers(&at.p);
+        }
         self.nodes = par.map_indexed(at.dv.len(), |b| {
             let (dv, a_dv) = (at.dv[b], problem.matrix.row_product(b, &at.dv));
             Node { dv, a_dv, z: dv, a_z: a_dv }
@@ -129,10 +168,12 @@ impl Relaxation<'_, '_> {
         self.work.contacts += self.p.len() as u64;
     }
 
-    fn iterate(&mut self, at: &mut Iterate, iterations_max: u32, hand_over: bool, buffers: &mut MeasureBuffers) -> Run {
+    fn iterate(&mut self, at: &mut Iterate, control: Control, buffers: &mut MeasureBuffers) -> Run {
         let mut test = StopTest::new();
-        let mut stagnation = Stagnation::new(STAGNATION);
-        let mut level = 0;
+        let mut passes_stagnation = Stagnation::new(PASSES_STAGNATION);
+        let mut stagnation = Stagnation::new(control.patience);
+        let iterations_max = control.iterations_max;
+        let mut level = if control.thorough { PASSES.len() - 1 } else { 0 };
         let mut k = 0;
         while k < iterations_max {
             self.passes(PASSES[level], k);
@@ -145,55 +186,74 @@ impl Relaxation<'_, '_> {
                 let verdict = test.check(self.task, &now, &residuals, k, at, buffers, &mut self.work);
                 (self.u, self.p) = (now.dv, now.p);
                 match verdict {
-                    Verdict::Converged => return Run { iterations: k, ending: Ending::Converged },
+                    Verdict::Converged(e) => return Run { iterations: k, ending: Ending::Converged, error: Some(e) },
                     Verdict::Diverged => {
+                        self.rounded = false;
                         self.set_scale(1.5 * self.metric_scale);
                         self.restart_from(at);
                         continue;
                     }
                     Verdict::Continue => {}
                 }
+                if residuals.contact() > self.task.settings.contact_tolerance
+                    && passes_stagnation.seen(residuals.contact(), k)
+                    && level + 1 < PASSES.len()
+                {
+                    level += 1;
+                }
                 if stagnation.seen(residuals.merit(), k) {
-                    if level + 1 < PASSES.len() {
-                        level += 1;
-                    } else if hand_over {
-                        return Run { iterations: k, ending: Ending::Stagnated };
+                    if self.rounded {
+                        // What is left may be rounding.
+                        self.rounded = false;
+                    } else {
+                        return Run { iterations: k, ending: Ending::Stagnated, error: None };
                     }
                 }
             }
-            self.extrapolate(sums);
+            self.extrapolate(sums, check.then_some(buffers.contact.as_slice()));
         }
-        Run { iterations: k, ending: Ending::Exhausted }
+        Run { iterations: k, ending: Ending::Exhausted, error: None }
     }
 
-    /// Relaxes the contacts: all of them now and then, else those that press or are near.
+    /// Relaxes the contacts: all of them now and then, else those that press.
     fn passes(&mut self, passes: u32, iteration: u32) {
         let Task { problem, packed, settings, par, .. } = *self.task;
-        let cx = PassContext {
-            rows: problem.rows,
-            inverse: &self.inverse,
-            metrics: &self.metrics,
-            cone: settings.friction_cone,
-            repeats: 1,
-            par,
-        };
+        let cone = settings.friction_cone;
+        if self.rounded {
+            self.single_pass.round_velocities(&self.u, &mut self.u_single, par);
+        }
         for pass in 0..passes {
-            let full = pass == 0 && iteration % FULL_PASS_EVERY == 0;
-            if full {
-                self.work.contacts += packed.pass(&cx, None, &mut self.p, &mut self.u);
-                self.near.clear();
-                let p = &self.p;
-                self.near.extend((0..p.len() as u32).filter(|c| p[*c as usize][0] > 0.0));
+            let full = pass == 0 && iteration.is_multiple_of(FULL_PASS_EVERY);
+            let list = if full { None } else { Some(self.near.as_slice()) };
+            self.work.contacts += if self.rounded {
+                self.single_pass.pass(cone, list, &mut self.p_single, &mut self.u_single)
             } else {
-                self.work.contacts += packed.pass(&cx, Some(&self.near), &mut self.p, &mut self.u);
+                let (inverse, metrics) = (self.inverse.as_slice(), self.metrics.as_slice());
+                let cx = PassContext { rows: problem.rows, inverse, metrics, cone, repeats: 1, par };
+                packed.pass(&cx, list, &mut self.p, &mut self.u)
+            };
+            if full {
+                self.near.clear();
+                let (p, p_single, rounded) = (&self.p, &self.p_single, self.rounded);
+                let presses = |c: usize| if rounded { p_single[c][0] > 0.0 } else { p[c][0] > 0.0 };
+                self.near.extend((0..packed.contacts.len() as u32).filter(|c| presses(*c as usize)));
             }
+        }
+        if self.rounded {
+            // The change in f32 is added to the prediction in f64.
+            let (pass, after) = (&self.single_pass, &self.u_single);
+            par.for_each_block(&mut self.u, |start, part| {
+                for (i, u) in part.iter_mut().enumerate() {
+                    *u = pass.add_change(*u, after[start + i]);
+                }
+            });
         }
     }
 
     /// `A dv'` and the sums that steer step and momentum; `exact` in double precision throughout.
     fn product(&mut self, exact: bool) -> Sums {
-        let Task { problem, par, .. } = *self.task;
-        let (matrix, single) = (problem.matrix, self.single);
+        let Task { problem, single, par, .. } = *self.task;
+        let matrix = problem.matrix;
         let (u, nodes) = (&self.u, &self.nodes);
         let (coupled, s) = (self.coupled, self.metric_scale);
         let increment = if exact { Default::default() } else { single.round(u.len(), |b| sub(u[b], nodes[b].dv), par) };
@@ -221,22 +281,25 @@ impl Relaxation<'_, '_> {
 
     /// Residuals of `(dv', p)`; leaves `A dv'` and `C^T p` in the buffers for the error estimate.
     fn residuals(&mut self, buffers: &mut MeasureBuffers) -> Residuals {
-        let Task { problem, par, .. } = *self.task;
+        let Task { packed, settings, par, .. } = *self.task;
+        if self.rounded {
+            self.single_pass.multipliers(packed, settings.friction_cone, &self.p_single, &mut self.p);
+        }
         let mut residuals = contact_residuals(self.task, &self.u, &self.p);
-        self.work.contacts += self.p.len() as u64;
+        self.work.contacts += 2 * self.p.len() as u64;
         buffers.product.clone_from(&self.a_u);
         buffers.contact.resize(self.u.len(), [0.0; 3]);
-        let (u, nodes, coupled, s) = (&self.u, &self.nodes, self.coupled, self.metric_scale);
-        par.map_into(&mut buffers.contact, |b| {
-            let s = if coupled[b] { s } else { 1.0 };
-            add_scaled(nodes[b].a_z, s, mat_vec(problem.matrix.diagonal_block(b), sub(u[b], nodes[b].z)))
-        });
+        packed.impulses(&self.p, &mut buffers.impulses, par);
+        let f = &buffers.impulses;
+        par.map_into(&mut buffers.contact, |b| packed.gather(b, f));
         residuals.dynamics = dynamics_residual(self.task, &buffers.product, &buffers.contact);
         residuals
     }
 
     /// Momentum, restarts and step size; the next prediction.
-    fn extrapolate(&mut self, sums: Sums) {
+    ///
+    /// `contact` is `C^T p` where that was just gathered; else it follows from the prediction that was relaxed.
+    fn extrapolate(&mut self, sums: Sums, contact: Option<&[Vec3]>) {
         let before = self.metric_scale;
         if sums.curvature > sums.metric * (1.0 + 1e-9) {
             self.set_scale((1.02 * before * sums.curvature / sums.metric).max(1.03 * before));
@@ -258,10 +321,15 @@ impl Relaxation<'_, '_> {
                 let b = *start + i;
                 let z = add_scaled(*u, beta, sub(*u, node.dv));
                 let a_z = add_scaled(a_u[b], beta, sub(a_u[b], node.a_dv));
-                let step = scale(if coupled[b] { change } else { 1.0 }, sub(*u, node.z));
-                let response = mat_vec(&inverse[b], sub(node.a_z, a_z));
+                let response = match contact {
+                    Some(q) => mat_vec(&inverse[b], sub(q[b], a_z)),
+                    None => {
+                        let step = scale(if coupled[b] { change } else { 1.0 }, sub(*u, node.z));
+                        add(step, mat_vec(&inverse[b], sub(node.a_z, a_z)))
+                    }
+                };
                 *node = Node { dv: *u, a_dv: a_u[b], z, a_z };
-                *u = add(z, add(step, response));
+                *u = add(z, response);
             }
         });
     }

@@ -1,5 +1,5 @@
 //! Augmented Lagrangian: contacts as penalties around the current multipliers, minimised over `dv` by Newton steps with
-//! preconditioned conjugate gradients [AlartCurnier91; Bertsekas82]. Slower than relaxation on easy problems, but
+//! preconditioned conjugate gradients [Alart91; Bertsekas82]. Slower than relaxation on easy problems, but
 //! conflicting rows only stiffen it, so it is the fallback.
 //!
 //! `phi(dv) = dv^T A dv / 2 + sum |P(p - rho w)|^2 / (2 rho)`, with `rho = k / d`, P the projection on the limits and the
@@ -10,7 +10,7 @@ use super::packed_contacts::{contact_velocity, relative_velocity, world_stiffnes
 use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure};
 use super::stop_test::{Ending, Run, StopTest, Verdict};
 use crate::linalg::{GradientBuffers, conjugate_gradient};
-use crate::math::{Mat3, Vec3, add_scaled, dot, inverse, mat_add, mat_scale, mat_vec, norm, sub};
+use crate::math::{Mat3, Vec3, add, add_scaled, dot, inverse, mat_add, mat_scale, mat_vec, norm, sub};
 use crate::model::FrictionCone;
 
 /// Penalty stiffness relative to the effective mass of a contact.
@@ -111,19 +111,23 @@ impl Lagrangian<'_, '_> {
             let residuals = measure(self.task, &now, buffers, &mut self.work);
             self.product.copy_from_slice(&buffers.product);
             match test.check(self.task, &now, &residuals, iterations, at, buffers, &mut self.work) {
-                Verdict::Converged => return Run { iterations, ending: Ending::Converged },
+                Verdict::Converged(e) => return Run { iterations, ending: Ending::Converged, error: Some(e) },
                 Verdict::Continue => {}
                 Verdict::Diverged => {
                     // Softer contacts from the best iterate.
-                    for penalty in &mut self.penalties {
-                        penalty.stiffness = penalty.stiffness.map(|s| 0.3 * s);
-                    }
+                    self.scale_stiffness(0.3);
                     now.clone_from(at);
                     self.task.problem.matrix.product(&now.dv, &mut self.product, self.task.par);
                 }
             }
         }
-        Run { iterations, ending: Ending::Exhausted }
+        Run { iterations, ending: Ending::Exhausted, error: None }
+    }
+
+    fn scale_stiffness(&mut self, factor: f64) {
+        for penalty in &mut self.penalties {
+            penalty.stiffness = penalty.stiffness.map(|s| factor * s);
+        }
     }
 
     /// Trial multipliers, contact stiffness and gradient at `now`; returns the largest change of a multiplier over its
@@ -166,7 +170,7 @@ impl Lagrangian<'_, '_> {
 
     /// Solves for the Newton step; returns the steps of the linear solve.
     fn newton_step(&mut self, steps_max: u32) -> u32 {
-        let Task { problem, packed, par, .. } = *self.task;
+        let Task { problem, packed, single, par, .. } = *self.task;
         let stiffness = &self.stiffness;
         let preconditioner: Vec<Mat3> = par.map_indexed(self.gradient.len(), |b| {
             let source = &problem.inverse_diagonal[b];
@@ -185,9 +189,11 @@ impl Lagrangian<'_, '_> {
                 None => [0.0; 3],
             });
             let f = &*impulses;
+            // The step is only wanted to a digit: single precision.
+            let rounded = single.round(d.len(), |b| d[b], par);
             par.map_into(out, |b| {
-                let y = problem.matrix.row_product(b, d);
-                add_scaled(y, 1.0, packed.gather(b, f))
+                let y = single.row_product(b, &rounded);
+                if packed.touches(b) { add(y, packed.gather(b, f)) } else { y }
             });
         };
         let precondition = |r: &[Vec3], z: &mut [Vec3]| par.map_into(z, |b| mat_vec(&preconditioner[b], r[b]));

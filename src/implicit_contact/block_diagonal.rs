@@ -3,16 +3,17 @@
 
 use super::packed_contacts::PassContext;
 use super::residuals::{Iterate, Task, Work, contact_residuals};
+use super::stop_test::{Ending, Run};
 use crate::math::{Vec3, add_scaled, dot, mat_vec, sub};
 
 /// Passes between two residual checks.
 const CHECK_EVERY: u32 = 8;
 
-/// Solves in place; returns the passes made and whether the contact tolerance was met.
+/// Solves in place, until the residuals and the estimated velocity error are within their tolerances.
 ///
 /// Passes are accelerated as a nonlinear conjugate gradient method [Silcowitz10]: a pass is a fixed-point map of `p`,
 /// its step the gradient. The direction is dropped whenever the step grows.
-pub(super) fn solve(task: &Task, at: &mut Iterate, iterations_max: u32, work: &mut Work) -> (u32, bool) {
+pub(super) fn solve(task: &Task, at: &mut Iterate, iterations_max: u32, work: &mut Work) -> Run {
     let Task { problem, packed, settings, par, .. } = *task;
     let inverse = problem.inverse_diagonal;
     let metrics = packed.metrics(problem.rows, inverse, par);
@@ -30,6 +31,7 @@ pub(super) fn solve(task: &Task, at: &mut Iterate, iterations_max: u32, work: &m
     let mut direction = vec![[0.0; 3]; count];
     let mut step_squared = f64::INFINITY;
     let mut iterations = 0;
+    let mut contraction = Contraction::default();
     while iterations < iterations_max {
         before.copy_from_slice(&at.p);
         work.contacts += packed.pass(&cx, None, &mut at.p, &mut at.dv);
@@ -41,8 +43,9 @@ pub(super) fn solve(task: &Task, at: &mut Iterate, iterations_max: u32, work: &m
             let residuals = contact_residuals(task, &exact.dv, &at.p);
             work.contacts += 2 * count as u64;
             at.dv = exact.dv;
-            if residuals.contact() <= settings.contact_tolerance && small(task, at, residuals.contact_energy) {
-                return (iterations, true);
+            let error = contraction.error(task, &at.dv, residuals.contact_energy);
+            if residuals.contact() <= settings.contact_tolerance && error <= settings.velocity_tolerance {
+                return Run { iterations, ending: Ending::Converged, error: Some(error) };
             }
             if last {
                 break;
@@ -52,15 +55,43 @@ pub(super) fn solve(task: &Task, at: &mut Iterate, iterations_max: u32, work: &m
         respond(&at.p, &mut at.dv, &mut impulses);
         work.contacts += count as u64;
     }
-    (iterations, false)
+    Run { iterations, ending: Ending::Exhausted, error: None }
 }
 
-/// Whether the energy of what is left is within the velocity tolerance.
-fn small(task: &Task, at: &Iterate, contact_energy: f64) -> bool {
-    let (matrix, dv) = (task.problem.matrix, &at.dv);
-    let energy = task.par.sum(dv.len(), |b| dot(dv[b], matrix.row_product(b, dv)));
-    let tolerance = task.settings.velocity_tolerance;
-    contact_energy <= tolerance * tolerance * energy.max(task.impulse_floor * task.impulse_floor)
+/// Velocity error from how fast the iterates draw together: violations of a tall stack are small everywhere and large
+/// together, so their energy alone says little.
+#[derive(Default)]
+struct Contraction {
+    previous: Vec<Vec3>,
+    /// `|change|^2` in the norm of A between the last two checks.
+    change: Option<f64>,
+}
+
+impl Contraction {
+    /// Estimated `|dv - dv_exact|_A / |dv_exact|_A`: the change since the last check, continued geometrically.
+    fn error(&mut self, task: &Task, dv: &[Vec3], contact_energy: f64) -> f64 {
+        let matrix = task.problem.matrix;
+        let diagonal = |b: usize, v: Vec3| dot(v, mat_vec(matrix.diagonal_block(b), v));
+        let energy = task.par.sum(dv.len(), |b| diagonal(b, dv[b]));
+        let scale = energy.max(task.impulse_floor * task.impulse_floor);
+        let violation = (contact_energy / scale).sqrt();
+        let tolerance = task.settings.velocity_tolerance;
+        let first = self.previous.is_empty();
+        if first {
+            self.previous = dv.to_vec();
+            // Nothing to continue yet: only what is solved outright may stop here.
+            return if violation <= 1e-2 * tolerance { violation } else { f64::INFINITY };
+        }
+        let previous = &self.previous;
+        let change = task.par.sum(dv.len(), |b| diagonal(b, sub(dv[b], previous[b])));
+        let ratio = match self.change {
+            Some(before) if before > 0.0 => (change / before).sqrt().min(0.98),
+            _ => 0.5,
+        };
+        self.change = Some(change);
+        self.previous.copy_from_slice(dv);
+        violation.max((change / scale).sqrt() * ratio / (1.0 - ratio))
+    }
 }
 
 /// Adds the conjugate direction to `at.p` after a pass from `before`, and projects.

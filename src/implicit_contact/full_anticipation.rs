@@ -51,12 +51,12 @@ pub(super) fn run(
         respond(task, &mut now, buffers, work);
         let residuals = measure(task, &now, buffers, work);
         match test.check(task, &now, &residuals, k, at, buffers, work) {
-            Verdict::Converged => return Run { iterations: k, ending: Ending::Converged },
+            Verdict::Converged(e) => return Run { iterations: k, ending: Ending::Converged, error: Some(e) },
             Verdict::Continue => {}
-            Verdict::Diverged => return Run { iterations: k, ending: Ending::Stagnated },
+            Verdict::Diverged => return Run { iterations: k, ending: Ending::Stagnated, error: None },
         }
     }
-    Run { iterations: iterations_max, ending: Ending::Exhausted }
+    Run { iterations: iterations_max, ending: Ending::Exhausted, error: None }
 }
 
 /// `dv = A^-1 C^T p`

@@ -69,12 +69,12 @@ pub(super) fn run(
             continue;
         }
         match test.check(task, &now, &residuals, k, at, buffers, work) {
-            Verdict::Converged => return (Run { iterations: k, ending: Ending::Converged }, paper),
+            Verdict::Converged(e) => return (Run { iterations: k, ending: Ending::Converged, error: Some(e) }, paper),
             Verdict::Continue => {}
             Verdict::Diverged => {
                 scale *= 1.5;
                 if scale > SCALE_MAX {
-                    return (Run { iterations: k, ending: Ending::Stagnated }, paper);
+                    return (Run { iterations: k, ending: Ending::Stagnated, error: None }, paper);
                 }
                 scaled = inverse.iter().map(|m| mat_scale(1.0 / scale, m)).collect();
                 metrics = task.packed.metrics(task.problem.rows, &scaled, task.par);
@@ -84,7 +84,7 @@ pub(super) fn run(
             }
         }
     }
-    (Run { iterations: iterations_max, ending: Ending::Exhausted }, paper)
+    (Run { iterations: iterations_max, ending: Ending::Exhausted, error: None }, paper)
 }
 
 /// The inner loop: passes over all contacts.

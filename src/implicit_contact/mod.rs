@@ -3,10 +3,12 @@
 //! * `problem`: the contact problem that every solver takes, what it reports, and the choice of the solver
 //! * `accelerated_relaxation`: the default solver
 //! * `iterative_anticipation`: the solver of the paper
+//! * `splitting_start`: a few iterations of operator splitting before it
 //! * `augmented_lagrangian`: the fallback where rows conflict
 //! * `full_anticipation`: the dense baseline
 //! * `block_diagonal`: the solver for lumped masses and rigid bodies alone
 //! * `packed_contacts`: contacts laid out for relaxation passes
+//! * `single_pass`: the relaxation pass in single precision
 //! * `friction`: the local solve of one contact
 //! * `residuals`: natural map, dynamics residual, velocity error
 //! * `constraint_set`: the contacts of a segment, which grow from round to round
@@ -32,6 +34,8 @@ mod memory;
 mod packed_contacts;
 mod problem;
 mod residuals;
+mod single_pass;
+mod splitting_start;
 mod stop_test;
 
 pub use advance::{Scratch, advance};

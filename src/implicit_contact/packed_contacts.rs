@@ -146,10 +146,12 @@ fn world_metric(rows: &RowSet, contact: &Contact, inverse: &[Mat3]) -> Mat3 {
     g
 }
 
-/// `R G R^T` as its upper triangle, symmetrised.
+/// `R G R^T` of a symmetric G as its upper triangle.
 fn frame_metric(frame: &[Vec3; 3], g: &Mat3) -> [f64; 6] {
-    let at = |i: usize, j: usize| 0.5 * (dot(frame[i], mat_vec(g, frame[j])) + dot(frame[j], mat_vec(g, frame[i])));
-    [at(0, 0).max(0.0), at(0, 1), at(0, 2), at(1, 1).max(0.0), at(1, 2), at(2, 2).max(0.0)]
+    let [n, a, b] = frame.map(|axis| mat_vec(g, axis));
+    let entries =
+        [dot(frame[0], n), dot(frame[0], a), dot(frame[0], b), dot(frame[1], a), dot(frame[1], b), dot(frame[2], b)];
+    [entries[0].max(0.0), entries[1], entries[2], entries[3].max(0.0), entries[4], entries[5].max(0.0)]
 }
 
 impl PackedContacts {

@@ -1,11 +1,12 @@
 //! The frictional contact problem [Otaduy09, Eq. 7] over one metric, and the one signature of its solvers.
 
+use super::accelerated_relaxation::Control;
 use super::friction::project;
 use super::iterative_anticipation::{self, Inner};
 use super::packed_contacts::PackedContacts;
 use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure, velocity_error};
 use super::stop_test::{Ending, Run};
-use super::{accelerated_relaxation, augmented_lagrangian, block_diagonal, full_anticipation};
+use super::{accelerated_relaxation, augmented_lagrangian, block_diagonal, full_anticipation, splitting_start};
 use crate::constraint::RowSet;
 use crate::linalg::{BlockMatrix, SinglePrecision};
 use crate::math::{Mat3, Vec3, is_finite, mat_vec};
@@ -15,6 +16,9 @@ use crate::parallel::Par;
 /// Fraction of the velocity scale that a block of mean mass would take from the smallest impulse that counts: the floor
 /// of the dynamics residual while no contact is active.
 const IMPULSE_FLOOR: f64 = 1e-2;
+
+/// Iterations without halving the residuals after which the relaxation hands over.
+const PATIENCE: u32 = 300;
 
 /// Find `dv`, `p = (lambda, gamma)` with `A dv = C^T p`, `0 <= lambda perp J dv >= c`, and friction within its limit.
 ///
@@ -74,25 +78,31 @@ pub fn solve(
     par: Par,
 ) -> SolverReport {
     let packed = PackedContacts::new(problem, par);
+    let velocity_scale = velocity_scale(problem);
+    let typical_mass = typical_mass(problem, &packed);
+    let single = SinglePrecision::new(problem.matrix, par);
     let task = Task {
         problem,
+        single: &single,
         packed: &packed,
         settings,
-        velocity_scale: velocity_scale(problem),
-        impulse_floor: impulse_floor(problem, &packed),
+        velocity_scale,
+        typical_mass,
+        impulse_floor: (IMPULSE_FLOOR * velocity_scale * typical_mass.sqrt()).max(f64::MIN_POSITIVE),
         par,
     };
     let coupled: Vec<bool> = (0..dv.len()).map(|b| is_coupled(problem, b)).collect();
     let mut at = warm_start(&task, impulses, dv);
     let mut work = Work::default();
     let mut report = SolverReport::default();
+    let mut error = None;
     if packed.contacts.is_empty() {
         at.dv.fill([0.0; 3]);
         report.converged = true;
     } else {
-        choose(&task, &coupled, &mut at, &mut scratch.measure, &mut work, &mut report);
+        error = choose(&task, &coupled, &mut at, &mut scratch.measure, &mut work, &mut report);
     }
-    finish(&task, &coupled, &mut at, &mut scratch.measure, &mut work, &mut report);
+    finish(&task, &coupled, &mut at, &mut scratch.measure, &mut work, error, &mut report);
     for (c, contact) in packed.contacts.iter().enumerate() {
         impulses[contact.source as usize] = at.p[c];
     }
@@ -108,7 +118,7 @@ fn choose(
     buffers: &mut MeasureBuffers,
     work: &mut Work,
     report: &mut SolverReport,
-) {
+) -> Option<f64> {
     let max = task.settings.iterations_max;
     let run = match task.settings.solver {
         SolverChoice::IterativeAnticipation | SolverChoice::LightAnticipation => {
@@ -120,30 +130,21 @@ fn choose(
         }
         SolverChoice::AugmentedLagrangian => augmented_lagrangian::run(task, at, max, buffers, work),
         SolverChoice::FullAnticipation => full_anticipation::run(task, at, max, buffers, work),
-        SolverChoice::AcceleratedRelaxation => relaxation(task, coupled, at, (max, false), buffers, work),
-        SolverChoice::Automatic if coupled.iter().any(|c| *c) => automatic(task, coupled, at, buffers, work, report),
-        SolverChoice::Automatic => {
-            let (iterations, converged) = block_diagonal::solve(task, at, max, work);
-            Run { iterations, ending: if converged { Ending::Converged } else { Ending::Exhausted } }
+        SolverChoice::AcceleratedRelaxation => {
+            let control = Control { iterations_max: max, patience: u32::MAX, thorough: false };
+            accelerated_relaxation::run(task, coupled, at, control, buffers, work)
         }
+        SolverChoice::Automatic if coupled.iter().any(|c| *c) => automatic(task, coupled, at, buffers, work, report),
+        SolverChoice::Automatic => block_diagonal::solve(task, at, max, work),
     };
     report.iterations = run.iterations;
     report.converged = run.ending == Ending::Converged;
+    run.error
 }
 
-fn relaxation(
-    task: &Task,
-    coupled: &[bool],
-    at: &mut Iterate,
-    control: (u32, bool),
-    buffers: &mut MeasureBuffers,
-    work: &mut Work,
-) -> Run {
-    let single = SinglePrecision::new(task.problem.matrix, task.par);
-    accelerated_relaxation::run(task, &single, coupled, at, control, buffers, work)
-}
-
-/// Relaxation, and the augmented Lagrangian when that stagnates.
+/// A short splitting start if asked for, relaxation, and the augmented Lagrangian when that stagnates. Where that does
+/// not get there either, with as many iterations as went before, relaxation takes over again: with the most passes and
+/// twice the patience.
 fn automatic(
     task: &Task,
     coupled: &[bool],
@@ -153,13 +154,27 @@ fn automatic(
     report: &mut SolverReport,
 ) -> Run {
     let max = task.settings.iterations_max;
-    let first = relaxation(task, coupled, at, (max, true), buffers, work);
-    if first.ending != Ending::Stagnated {
-        return first;
+    if task.settings.splitting_iterations > 0 {
+        splitting_start::run(task, at, task.settings.splitting_iterations, work);
     }
-    report.hand_overs += 1;
-    let second = augmented_lagrangian::run(task, at, max - first.iterations, buffers, work);
-    Run { iterations: first.iterations + second.iterations, ending: second.ending }
+    let mut iterations = 0;
+    let mut control = Control { iterations_max: max, patience: PATIENCE, thorough: false };
+    loop {
+        control.iterations_max = max - iterations;
+        let run = accelerated_relaxation::run(task, coupled, at, control, buffers, work);
+        iterations += run.iterations;
+        if run.ending != Ending::Stagnated || iterations >= max {
+            return Run { iterations, ..run };
+        }
+        report.hand_overs += 1;
+        let run = augmented_lagrangian::run(task, at, iterations.min(max - iterations), buffers, work);
+        iterations += run.iterations;
+        if run.ending == Ending::Converged || iterations >= max {
+            return Run { iterations, ..run };
+        }
+        report.hand_overs += 1;
+        control = Control { patience: control.patience.saturating_mul(2), thorough: true, ..control };
+    }
 }
 
 /// The scale that residuals are relative to: the problem's, else the largest target, else 1.
@@ -172,19 +187,18 @@ fn velocity_scale(problem: &ContactProblem) -> f64 {
     if usable(targets) { targets } else { 1.0 }
 }
 
-/// `|C^T p|` in the norm of the inverse diagonal that changes one touched block of mean mass by a small fraction of the
-/// velocity scale.
-fn impulse_floor(problem: &ContactProblem, packed: &PackedContacts) -> f64 {
+/// Harmonic mean mass of the blocks that contacts touch, so that what is light counts; 1 when none has a finite mass.
+fn typical_mass(problem: &ContactProblem, packed: &PackedContacts) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for (b, m) in problem.inverse_diagonal.iter().enumerate() {
         let trace = m[0][0] + m[1][1] + m[2][2];
         if trace > 0.0 && packed.touches(b) {
-            sum += 3.0 / trace;
+            sum += trace / 3.0;
             count += 1.0;
         }
     }
-    let mass: f64 = if count > 0.0 { sum / count } else { 0.0 };
-    (IMPULSE_FLOOR * velocity_scale(problem) * mass.sqrt()).max(f64::MIN_POSITIVE)
+    let mean: f64 = if sum > 0.0 { count / sum } else { 1.0 };
+    if mean.is_finite() && mean > 0.0 { mean } else { 1.0 }
 }
 
 /// Whether block row `b` has entries beside its diagonal.
@@ -212,6 +226,7 @@ fn finish(
     at: &mut Iterate,
     buffers: &mut MeasureBuffers,
     work: &mut Work,
+    error: Option<f64>,
     report: &mut SolverReport,
 ) {
     let sound = |at: &Iterate| at.dv.iter().chain(&at.p).all(|v| is_finite(*v));
@@ -233,6 +248,6 @@ fn finish(
     report.complementarity_residual = residuals.normal;
     report.friction_residual = residuals.friction;
     report.dynamics_residual = residuals.dynamics;
-    report.velocity_error = velocity_error(task, at, &residuals, buffers, work);
+    report.velocity_error = error.unwrap_or_else(|| velocity_error(task, at, &residuals, buffers, work));
     report.work = work.blocks + work.contacts;
 }

@@ -23,13 +23,15 @@ pub(super) struct Run {
     pub iterations: u32,
     /// How it ended.
     pub ending: Ending,
+    /// Estimated velocity error of the iterate left in place, where one was made.
+    pub error: Option<f64>,
 }
 
 /// What to do after a check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Verdict {
-    /// Tolerances met by the iterate just checked.
-    Converged,
+    /// Tolerances met by the iterate just checked, with this estimated velocity error.
+    Converged(f64),
     /// Go on.
     Continue,
     /// The iterate is far worse than the best: under-relax and restart from that one.
@@ -76,7 +78,7 @@ impl StopTest {
             let error = velocity_error(task, now, residuals, buffers, work);
             if error <= tolerance {
                 best.clone_from(now);
-                return Verdict::Converged;
+                return Verdict::Converged(error);
             }
             let missing = (error / tolerance).ln().clamp(0.1, 1.0);
             self.wait_until = iteration + (f64::from(iteration) * 0.3 * missing) as u32;

@@ -1,4 +1,4 @@
-//! Incomplete block Cholesky factor without fill, in single precision: a preconditioner [MeijerinkVanDerVorst77].
+//! Incomplete block Cholesky factor without fill, in single precision: a preconditioner [Meijerink77].
 
 use super::BlockMatrix;
 use crate::math::{Mat3, Vec3, mat_add, mat_mul, mat_scale, transpose};

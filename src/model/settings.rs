@@ -54,6 +54,9 @@ pub struct Settings {
     pub velocity_tolerance: f64,
     /// Outer iterations of one constrained dynamics solve at most.
     pub iterations_max: u32,
+    /// Iterations of operator splitting before the relaxation of [`SolverChoice::Automatic`]; 0 for none. They pay where
+    /// a coarse answer to fast moving, stiff cloth is enough.
+    pub splitting_iterations: u32,
     /// Rounds of constraint manifold refinement before a step is divided [Otaduy09, §4: 5].
     pub rounds_max: u32,
     /// Halvings of a step before the fail-safes [Otaduy09, §4: 2].
@@ -76,8 +79,9 @@ impl Default for Settings {
             friction_cone: FrictionCone::default(),
             start_policy: StartPolicy::default(),
             contact_tolerance: 1e-3,
-            velocity_tolerance: 1e-2,
+            velocity_tolerance: 2e-2,
             iterations_max: 2000,
+            splitting_iterations: 0,
             rounds_max: 5,
             halvings_max: 2,
             recovery_fraction: 0.1,

@@ -8,6 +8,12 @@ mod ccd_inclusion;
 mod ccd_separation;
 mod distance;
 mod intersection;
+#[allow(dead_code, unused_imports)]
+#[path = "../../benches/support/mod.rs"]
+mod problem_files;
 mod proximity;
 mod random;
 mod scenes;
+mod solver;
+mod solver_problems;
+mod solver_traps;
