@@ -14,6 +14,7 @@ mod mesh_file;
 mod npy;
 
 type Point = [f64; 3];
+type Detector<'a> = dyn Fn(&[Point; 4], &[Point; 4]) -> Option<f64> + 'a;
 
 struct Step {
     name: String,
@@ -170,7 +171,7 @@ fn bench_families(dir: &Path, kind: &str) -> Result<(), String> {
                 (points(0), points(12))
             })
             .collect();
-        let timed = |f: &dyn Fn(&[Point; 4], &[Point; 4]) -> Option<f64>| {
+        let timed = |f: &Detector| {
             let (mut hits, mut total, mut worst) = (0, 0.0, 0.0_f64);
             for (x0, x1) in &queries {
                 let mut least = f64::INFINITY;

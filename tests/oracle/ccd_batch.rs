@@ -6,8 +6,11 @@ use signorini::parallel::{Par, Pool};
 
 type Point = [f64; 3];
 
+/// Start, end, faces, edges.
+type Soup = (Vec<Point>, Vec<Point>, Vec<[u32; 3]>, Vec<[u32; 2]>);
+
 /// Loose triangles in a box, each moving on its own.
-fn soup(count: usize) -> (Vec<Point>, Vec<Point>, Vec<[u32; 3]>, Vec<[u32; 2]>) {
+fn soup(count: usize) -> Soup {
     let mut random = Random(20_091_122);
     let mut point = |size: f64| -> Point { std::array::from_fn(|_| random.uniform(-size, size)) };
     let (mut x0, mut x1) = (Vec::new(), Vec::new());

@@ -47,9 +47,9 @@ fn swept_box(x0: &[Point], x1: &[Point], vertices: &[u32]) -> SweptBox {
     let mut b = SweptBox { low: [f64::INFINITY; 3], high: [f64::NEG_INFINITY; 3] };
     for v in vertices {
         for p in [x0[*v as usize], x1[*v as usize]] {
-            for c in 0..3 {
-                b.low[c] = b.low[c].min(p[c]);
-                b.high[c] = b.high[c].max(p[c]);
+            for (c, x) in p.into_iter().enumerate() {
+                b.low[c] = b.low[c].min(x);
+                b.high[c] = b.high[c].max(x);
             }
         }
     }
