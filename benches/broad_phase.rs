@@ -4,6 +4,8 @@
 //! and `NAME_f.npy` (int32, m x 3) for any number of scenes; without it two waved sheets made here are measured.
 //! One JSON line per figure.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 use signorini::detection::{BroadPhase, Candidates};
 use signorini::math::Vec3;
 use signorini::mesh::Surface;

@@ -137,7 +137,7 @@ mod tests {
             assert!(init(given, 3).is_err() && init(given, 5000).is_err());
             assert!(init(given, known + 16).is_ok());
             assert!(read(given).is_ok(), "a newer caller with nothing set");
-            bytes[known / 8 + 1] = 1 << 40;
+            given.cast::<u64>().add(known / 8 + 1).write(1 << 40);
             let error = read(given).map(|_| ()).unwrap_err();
             assert_eq!((error.code, error.index), (SGN_ERROR_UNSUPPORTED_STRUCT, known as u64 + 8 + 5));
             given.cast::<u32>().write(u32::MAX);

@@ -92,7 +92,7 @@ fn delassus(task: &Task, work: &mut Work) -> Vec<Mat3> {
             solve_metric(task, &load, &mut response, &mut buffers, work);
             for (row, contact) in packed.contacts.iter().enumerate() {
                 let w = sub(
-                    contact.to_frame(super::packed_contacts::relative_velocity(contact, rows, &response)),
+                    contact.in_frame(super::packed_contacts::relative_velocity(contact, rows, &response)),
                     contact.target,
                 );
                 for i in 0..3 {

@@ -67,14 +67,14 @@ pub(super) fn relative_velocity(contact: &Contact, rows: &RowSet, v: &[Vec3]) ->
 impl Contact {
     /// `R u + target`
     #[inline(always)]
-    pub fn to_frame(&self, u: Vec3) -> Vec3 {
+    pub fn in_frame(&self, u: Vec3) -> Vec3 {
         let (f, t) = (&self.frame, self.target);
         [dot(f[0], u) + t[0], dot(f[1], u) + t[1], dot(f[2], u) + t[2]]
     }
 
     /// `R^T p`
     #[inline(always)]
-    pub fn to_world(&self, p: Vec3) -> Vec3 {
+    pub fn in_world(&self, p: Vec3) -> Vec3 {
         add_scaled(add_scaled(scale(p[0], self.frame[0]), p[1], self.frame[1]), p[2], self.frame[2])
     }
 }
@@ -82,7 +82,7 @@ impl Contact {
 /// `C dv + target` of one contact.
 #[inline(always)]
 pub(super) fn contact_velocity(contact: &Contact, rows: &RowSet, dv: &[Vec3]) -> Vec3 {
-    contact.to_frame(relative_velocity(contact, rows, dv))
+    contact.in_frame(relative_velocity(contact, rows, dv))
 }
 
 /// `u += S^-1 W^T f` for one contact.
@@ -216,7 +216,7 @@ impl PackedContacts {
     /// World impulses `R^T p` of all contacts.
     pub fn impulses(&self, p: &[Vec3], out: &mut Vec<Vec3>, par: Par) {
         out.resize(self.contacts.len(), [0.0; 3]);
-        par.map_into(out, |c| self.contacts[c].to_world(p[c]));
+        par.map_into(out, |c| self.contacts[c].in_world(p[c]));
     }
 
     /// Block `b` of `W^T f`, summed in the order of the sweeps.
@@ -313,7 +313,7 @@ impl PackedContacts {
             if *after != p[c] {
                 let change = [after[0] - p[c][0], after[1] - p[c][1], after[2] - p[c][2]];
                 p[c] = *after;
-                respond(&self.contacts[c], cx.rows, cx.inverse, self.contacts[c].to_world(change), u);
+                respond(&self.contacts[c], cx.rows, cx.inverse, self.contacts[c].in_world(change), u);
             }
         }
     }
@@ -326,10 +326,10 @@ impl PackedContacts {
         if before[0] == 0.0 && dot(contact.frame[0], seen) + contact.target[0] >= 0.0 {
             return;
         }
-        let after = contact.step(cx, &cx.metrics[c], before, contact.to_frame(seen));
+        let after = contact.step(cx, &cx.metrics[c], before, contact.in_frame(seen));
         let change = [after[0] - before[0], after[1] - before[1], after[2] - before[2]];
         p[c] = after;
-        respond(contact, cx.rows, cx.inverse, contact.to_world(change), u);
+        respond(contact, cx.rows, cx.inverse, contact.in_world(change), u);
     }
 
     /// Natural-map residuals of contact `c` at `p` and contact velocity `w` `[m/s]`: normal, tangential.

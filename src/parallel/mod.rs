@@ -128,12 +128,10 @@ mod tests {
         let f = |i: usize| 1.0 / (1.0 + i as f64);
         let serial = Par::Serial.sum(100_003, f);
         for threads in [1, 2, 5] {
-            let pool = Pool::new(threads).map_err(|e| panic!("{e}"));
-            if let Ok(pool) = pool {
-                assert_eq!(serial.to_bits(), Par::Pool(&pool).sum(100_003, f).to_bits());
-                let squares = Par::Pool(&pool).map_indexed(5000, |i| i * i);
-                assert!(squares.iter().enumerate().all(|(i, s)| *s == i * i));
-            }
+            let pool = Pool::new(threads).expect("threads start");
+            assert_eq!(serial.to_bits(), Par::Pool(&pool).sum(100_003, f).to_bits());
+            let squares = Par::Pool(&pool).map_indexed(5000, |i| i * i);
+            assert!(squares.iter().enumerate().all(|(i, s)| *s == i * i));
         }
     }
 }
