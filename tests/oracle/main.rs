@@ -1,4 +1,5 @@
 //! The library against independent answers: exact arithmetic, closed forms, brute force, other algorithms.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod broad_phase;
 mod ccd_batch;
