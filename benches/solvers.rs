@@ -169,11 +169,11 @@ fn curve(problem: &Problem, reference: &[Vec3], name: &str, solver: SolverChoice
 /// A tight solve, cached.
 fn reference(problem: &Problem, file: &Path) -> Vec<Vec3> {
     let cache = file.with_extension("reference");
-    if let Ok(bytes) = std::fs::read(&cache) {
-        if bytes.len() == 24 * problem.matrix.rows() {
-            let word = |c: &[u8]| f64::from_le_bytes(c.try_into().unwrap());
-            return bytes.chunks(24).map(|c| [word(&c[..8]), word(&c[8..16]), word(&c[16..])]).collect();
-        }
+    if let Ok(bytes) = std::fs::read(&cache)
+        && bytes.len() == 24 * problem.matrix.rows()
+    {
+        let word = |c: &[u8]| f64::from_le_bytes(c.try_into().unwrap());
+        return bytes.chunks(24).map(|c| [word(&c[..8]), word(&c[8..16]), word(&c[16..])]).collect();
     }
     let settings = Settings {
         solver: SolverChoice::AcceleratedRelaxation,

@@ -38,7 +38,7 @@ impl Pose {
     }
 }
 
-/// Lever `l` of a vertex that turns from the arm `r0` to the arm `r1` by `angle` [rad]: `omega x l` is the mean velocity
+/// Lever `l` of a vertex that turns from the arm `r0` to the arm `r1` by `angle` `[rad]`: `omega x l` is the mean velocity
 /// of its chord, so that a row with this lever is exact at the motion it was made for.
 ///
 /// From the identity `r1 - r0 = 2 tan(angle/2) axis x (r0 + r1)/2`. Beyond two radians, where the tangent runs away,

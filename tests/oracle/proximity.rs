@@ -94,7 +94,7 @@ fn distinct_pairs_keep_every_row() {
         assert!(kept.iter().all(|pair| all.contains(pair)));
         let row = |pair: &NearPair| {
             let mut row: Vec<(u32, f64)> = pair.vertices.into_iter().zip(pair.weights).filter(|w| w.1 != 0.0).collect();
-            row.sort_by(|a, b| a.0.cmp(&b.0));
+            row.sort_by_key(|a| a.0);
             row
         };
         // Up to its sign, each dropped row is one of the kept ones.

@@ -363,7 +363,7 @@ fn parts(family: usize, r: &mut Random) -> (&'static str, Vec<Part>) {
             body.period = 6;
             let mut c = cloth(6, 1.2);
             if r.chance(0.5) {
-                c.pinned = (0..36).map(|i| i < 6 || i >= 30).collect();
+                c.pinned = (0..36).map(|i| !(6..30).contains(&i)).collect();
             }
             ("deforming", vec![body, c])
         }
@@ -658,13 +658,13 @@ impl Scene {
         let per_step = self.length / self.dt;
         for (index, p) in self.parts.iter().enumerate() {
             let body = &self.model.bodies[index];
-            let forth = if (step / p.period.max(1)) % 2 == 0 { 1.0 } else { -1.0 };
+            let forth = if (step / p.period.max(1)).is_multiple_of(2) { 1.0 } else { -1.0 };
             match p.drive {
                 Drive::Soft | Drive::Rigid => {
                     for (i, b) in body.blocks.clone().enumerate() {
                         let angular = p.drive == Drive::Rigid && i == 1;
                         let mut v = scale(self.damping, last[b]);
-                        if step % 5 == 0 {
+                        if step.is_multiple_of(5) {
                             v = if angular {
                                 scale(1.0 / self.dt, p.spin)
                             } else {
@@ -674,7 +674,7 @@ impl Scene {
                             v = add_scaled(v, per_step, self.gravity);
                         }
                         if p.drive == Drive::Soft && p.pinned[i] {
-                            v = scale(if step % 4 == 0 { 0.05 * per_step } else { 0.0 }, r.vector(1.0));
+                            v = scale(if step.is_multiple_of(4) { 0.05 * per_step } else { 0.0 }, r.vector(1.0));
                         }
                         drives.velocities[b] = v;
                     }

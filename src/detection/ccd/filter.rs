@@ -5,9 +5,9 @@
 //! 3. *Roots*: the step is divided until every part has at most one change of sign among its coefficients, so exactly
 //!    one root or none. Each root is enclosed in a short bracket, at whose ends the sign of the cubic is certain, and
 //!    the barycentric coordinates are tested over the bracket. Inside: a hit, reported at the left end of the bracket.
-//!    Outside: no contact at this root. Left open by rounding: [`super::exact`] decides at this root.
+//!    Outside: no contact at this root. Left open by rounding: `exact` decides at this root.
 //! 4. *Separation*: [`super::separation`] with separation zero rules out what never comes close.
-//! 5. *Integers*: [`super::exact`] decides what is left: grazing contact, contact at an end of the step, pairs that stay
+//! 5. *Integers*: `exact` decides what is left: grazing contact, contact at an end of the step, pairs that stay
 //!    coplanar.
 //!
 //! *Work.* Parts 1 to 3 are bounded by [`MAX_PARTS`] parts and [`MAX_ITERATIONS`] evaluations for each root, part 4 by
