@@ -28,6 +28,10 @@ const PASSES: [u32; 4] = [1, 3, 6, 12];
 const SINGLE_FROM: f64 = 1e-5;
 /// Of the passes, one in so many visits all contacts; the others those that are near or press.
 const FULL_PASS_EVERY: u32 = 4;
+/// Residuals above which stagnation ends the run. Below, a slow relaxation is still faster than the augmented Lagrangian,
+/// whose multipliers converge linearly.
+const HAND_OVER_ABOVE: f64 = 1e-3;
+
 /// How long a run may go on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Control {
@@ -205,7 +209,7 @@ impl Relaxation<'_, '_> {
                     if self.rounded {
                         // What is left may be rounding.
                         self.rounded = false;
-                    } else {
+                    } else if residuals.merit() > HAND_OVER_ABOVE {
                         return Run { iterations: k, ending: Ending::Stagnated, error: None };
                     }
                 }

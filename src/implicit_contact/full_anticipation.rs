@@ -86,17 +86,18 @@ fn delassus(task: &Task, work: &mut Work) -> Vec<Mat3> {
     let mut buffers = GradientBuffers::default();
     for column in 0..contacts {
         let source = packed.contacts[column].source as usize;
-        for axis in 0..3 {
+        for (axis, direction) in rows.frames[source].iter().enumerate() {
             load.fill([0.0; 3]);
-            rows.scatter(source, rows.frames[source][axis], &mut load);
+            rows.scatter(source, *direction, &mut load);
             solve_metric(task, &load, &mut response, &mut buffers, work);
             for (row, contact) in packed.contacts.iter().enumerate() {
                 let w = sub(
                     contact.in_frame(super::packed_contacts::relative_velocity(contact, rows, &response)),
                     contact.target,
                 );
-                for i in 0..3 {
-                    b[row * contacts + column][i][axis] = w[i];
+                let block = &mut b[row * contacts + column];
+                for (entries, w) in block.iter_mut().zip(w) {
+                    entries[axis] = w;
                 }
             }
         }

@@ -87,10 +87,10 @@ pub(super) fn contact_residuals(task: &Task, dv: &[Vec3], p: &[Vec3]) -> Residua
     let mut partial = vec![Residuals::default(); count.div_ceil(BLOCK)];
     // One entry per block of contacts: maxima do not care about order, the sum is taken in index order.
     let each = |r: &mut Residuals, b: usize| {
-        for c in b * BLOCK..count.min((b + 1) * BLOCK) {
-            let contact = &task.packed.contacts[c];
+        let range = b * BLOCK..count.min((b + 1) * BLOCK);
+        for ((c, contact), p) in range.clone().zip(&task.packed.contacts[range.clone()]).zip(&p[range]) {
             let w = contact_velocity(contact, task.problem.rows, dv);
-            let [n, t] = task.packed.natural_map(cone, c, p[c], w);
+            let [n, t] = task.packed.natural_map(cone, c, *p, w);
             if !(n.is_finite() && t.is_finite()) {
                 r.normal = f64::INFINITY;
                 continue;

@@ -94,8 +94,8 @@ mod tests {
             let x: Vec<Vec3> = (0..5).map(|i| [velocity, -0.3 * velocity * f64::from(i), 0.1 * velocity]).collect();
             let single = SinglePrecision::new(&matrix, Par::Serial);
             let rounded = single.round(x.len(), |i| x[i], Par::Serial);
-            for i in 0..5 {
-                let (a, b) = (single.row_product(i, &rounded), mat_vec(&matrix.values[i], x[i]));
+            for (i, x) in x.iter().enumerate() {
+                let (a, b) = (single.row_product(i, &rounded), mat_vec(&matrix.values[i], *x));
                 assert!(largest(&sub(a, b)) <= 1e-6 * largest(&b), "{a:?} {b:?}");
             }
         }

@@ -93,8 +93,9 @@ fn recorded_problems_are_solved_as_by_an_interior_point_method() {
         let exact = interior_point(&frictionless);
         let (_, dv, report) = frictionless.solve(&tight(SolverChoice::Automatic));
         let error = made.error(&dv, &exact);
-        // Pressed layers converge slowly in the last digits: rows by the hundred share the load.
-        let [velocity, complementarity] = if name == "sandwich.bin" { [1e-4, 1e-6] } else { [1e-6, 1e-8] };
+        // Pressed layers converge slowly in the last digits: rows by the hundred share the load, and the reference is
+        // only as good as the root of its gap.
+        let [velocity, complementarity] = if name == "sandwich.bin" { [1e-5, 1e-6] } else { [1e-6, 1e-7] };
         assert!(error < velocity, "{name}: {error:e} {report:?}");
         assert!(report.complementarity_residual < complementarity, "{name}: {report:?}");
         // With friction and the tolerances that a host gets.
