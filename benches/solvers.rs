@@ -1,6 +1,6 @@
 //! The solver trial: time to a velocity error, cold and warm, on problem files.
 //!
-//! `cargo bench --bench solvers -- [--solvers a,b] [--warm] [--curve] FILE...`; a file is what `benches/problems.rs`
+//! `cargo bench --bench solvers -- [--solvers a,b] [--warm] [--curve] [--velocity 0.05] [--start 6] FILE...`; a file is what `benches/problems.rs`
 //! writes. References are tight solves, kept beside the files as `NAME.reference`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -29,11 +29,13 @@ struct Options {
     solvers: Vec<String>,
     warm: bool,
     curve: bool,
+    settings: Settings,
     files: Vec<PathBuf>,
 }
 
 fn options() -> Options {
-    let mut o = Options { solvers: Vec::new(), warm: false, curve: false, files: Vec::new() };
+    let mut o =
+        Options { solvers: Vec::new(), warm: false, curve: false, settings: Settings::default(), files: Vec::new() };
     let mut arguments = std::env::args().skip(1);
     while let Some(a) = arguments.next() {
         match a.as_str() {
@@ -41,6 +43,12 @@ fn options() -> Options {
             "--warm" => o.warm = true,
             "--curve" => o.curve = true,
             "--solvers" => o.solvers = arguments.next().unwrap_or_default().split(',').map(String::from).collect(),
+            "--velocity" => {
+                o.settings.velocity_tolerance = arguments.next().and_then(|t| t.parse().ok()).expect("a tolerance")
+            }
+            "--start" => {
+                o.settings.splitting_iterations = arguments.next().and_then(|t| t.parse().ok()).expect("iterations")
+            }
             file => o.files.push(file.into()),
         }
     }
@@ -58,7 +66,7 @@ fn main() {
         println!("\n{} blocks {n} nonzeros {z} contacts {m}; a product with A: {product:.3} ms", file.display());
         for (name, solver) in SOLVERS {
             if options.solvers.is_empty() || options.solvers.iter().any(|s| s == name) {
-                converged_run(&problem, &reference, name, solver, options.warm);
+                converged_run(&problem, &reference, name, solver, &options);
                 if options.curve {
                     curve(&problem, &reference, name, solver, options.warm);
                 }
@@ -127,15 +135,10 @@ fn describe(r: &SolverReport) -> String {
     )
 }
 
-/// A run with the default settings: what a host gets.
-fn converged_run(problem: &Problem, reference: &[Vec3], name: &str, solver: SolverChoice, warm: bool) {
-    let tolerance = std::env::var("X_TOL").ok().and_then(|s| s.parse().ok()).unwrap_or(2e-2);
-    let settings = Settings {
-        solver,
-        velocity_tolerance: tolerance,
-        splitting_iterations: std::env::var("X_ADMM").ok().and_then(|s| s.parse().ok()).unwrap_or(0),
-        ..Settings::default()
-    };
+/// A run with the settings of the command line, by default what a host gets.
+fn converged_run(problem: &Problem, reference: &[Vec3], name: &str, solver: SolverChoice, options: &Options) {
+    let warm = options.warm;
+    let settings = Settings { solver, ..options.settings };
     let (ms, dv, report) = run(problem, &settings, warm);
     let [a, two] = errors(problem, &dv, reference);
     println!("{name:12} {ms:8.1} ms error A {a:.1e} 2 {two:.1e} | {}", describe(&report));
