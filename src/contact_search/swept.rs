@@ -77,8 +77,8 @@ fn mesh_hit(model: &Model, passing: &Passing, pair: Pair, x0: &[Vec3], x1: &[Vec
     let distance = pair.closest_points(&p0).distance_squared.sqrt();
     let [a, b] = pair.bodies(model);
     let widest = minimum_separation(model.bodies[a].half_thickness + model.bodies[b].half_thickness, distance);
-    // A margin of rounding: the quick answer must not outrun the certified one.
-    if (1.0 - 1e-9) * distance > widest + (1.0 + 1e-9) * approach {
+    // Margins of rounding: the quick answer must not outrun the certified one.
+    if (1.0 - 1e-9) * distance - distance_rounding(&p0) > widest + (1.0 + 1e-9) * approach {
         return None;
     }
     let thickness = pair.thickness(model)?;
@@ -109,6 +109,13 @@ fn relative_motion(kind: PairKind, x0: &[Vec3; 4], x1: &[Vec3; 4]) -> f64 {
     };
     let farthest = d.iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
     squared.sqrt() + 8.0 * f64::EPSILON * farthest
+}
+
+/// What rounding may add to the distance of a pair: closest points are good to 16 roundings of the pair's extent.
+#[inline]
+fn distance_rounding(x: &[Vec3; 4]) -> f64 {
+    let extent = x[1..].iter().flat_map(|p| sub(*p, x[0])).fold(0.0_f64, |m, c| m.max(c.abs()));
+    32.0 * f64::EPSILON * extent
 }
 
 fn half_space_hit(model: &Model, passing: &Passing, pair: Pair, start: &State, end: &State) -> Option<Hit> {

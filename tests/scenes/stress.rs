@@ -413,6 +413,9 @@ fn report(tally: &Tally, runs: u64) {
     );
 }
 
+/// Seeds beyond the first that broke a promise once: 604, pairs closer than the rounding of their distance.
+const ONCE_BROKEN: [u64; 1] = [604];
+
 #[test]
 fn nasty_scenes_keep_the_promise() {
     let range = std::env::var("SIGNORINI_STRESS").ok();
@@ -426,7 +429,8 @@ fn nasty_scenes_keep_the_promise() {
     };
     let pools = pools();
     let mut tally = Tally::default();
-    for seed in first..first + count {
+    let once_broken = ONCE_BROKEN.into_iter().filter(|_| range.is_none());
+    for seed in (first..first + count).chain(once_broken) {
         let known = tally.findings.len();
         let began = std::time::Instant::now();
         run(seed, &pools, &mut tally);
