@@ -17,16 +17,19 @@ fn main() {
     link_by_soname(&name);
 }
 
-/// Puts a link of that name beside the library of `cargo test` (in `deps`), so that the programs of the tests find it. An
-/// installed library has its links from the installation; a link that cannot be made here is not missed there.
+/// Puts links of that name beside the library of `cargo build` (the profile's folder) and of `cargo test` (`deps` in it), so
+/// that programs linked against either find it. An installed library has its links from the installation; a link that
+/// cannot be made here is not missed there.
 fn link_by_soname(name: &str) {
     let out = PathBuf::from(std::env::var_os("OUT_DIR").unwrap_or_default());
-    let Some(folder) = out.ancestors().nth(3).map(|profile| profile.join("deps")) else { return };
-    let link = folder.join(name);
-    #[cfg(unix)]
-    if folder.is_dir() && link.symlink_metadata().is_err() {
-        let _ = std::os::unix::fs::symlink("libsignorini.so", link);
+    let Some(profile) = out.ancestors().nth(3) else { return };
+    for folder in [profile.to_path_buf(), profile.join("deps")] {
+        let link = folder.join(name);
+        #[cfg(unix)]
+        if folder.is_dir() && link.symlink_metadata().is_err() {
+            let _ = std::os::unix::fs::symlink("libsignorini.so", link);
+        }
+        #[cfg(not(unix))]
+        let _ = link;
     }
-    #[cfg(not(unix))]
-    let _ = link;
 }
