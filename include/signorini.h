@@ -1016,27 +1016,16 @@ typedef struct SgnShapeDesc {
 typedef int32_t SgnPrecision;
 
 /**
- * A body of free vertices whose dynamics are the host's. Fill with `sgn_deformable_desc_init`.
- *
- * Triangles, edges and points say what collides; edges of triangles need not be given. All three empty: every vertex is
- * a point.
+ * What all bodies have in common. Frozen, like `SgnView`: it stands in the middle of other structs.
  */
-typedef struct SgnDeformableDesc {
-  /**
-   * Set by the init function.
-   */
-  uint32_t struct_size;
-  /**
-   * An `SGN_PRECISION_` constant. Default: F64.
-   */
-  SgnPrecision precision;
+typedef struct SgnBodyOptions {
   /**
    * `SGN_BODY_` flags. Default: 0.
    */
   uint64_t flags;
   /**
    * Half of the thickness of a pair, in the host's unit of length: two bodies keep the sum of their halves apart.
-   * Negative: a tenth of the mean edge length. Default: -1.
+   * Negative: a tenth of the mean edge length, for a half-space 0. Default: -1.
    */
   double half_thickness;
   /**
@@ -1055,14 +1044,17 @@ typedef struct SgnDeformableDesc {
    * A number of the host's, handed back by `sgn_body_info`. Default: 0.
    */
   uint64_t user_key;
+} SgnBodyOptions;
+
+/**
+ * Vertices and what of them collides. Frozen, like `SgnView`. Edges of triangles need not be given. Triangles, edges and
+ * points all empty: every vertex is a point.
+ */
+typedef struct SgnMesh {
   /**
-   * Start positions, F32X3 or F64X3. They say how many vertices there are.
+   * Vertices, F32X3 or F64X3. They say how many there are.
    */
-  struct SgnView positions;
-  /**
-   * Rest positions, as many; empty: the start positions.
-   */
-  struct SgnView rest_positions;
+  struct SgnView vertices;
   /**
    * Triangles, U32X3 or U64X3, either winding.
    */
@@ -1075,6 +1067,32 @@ typedef struct SgnDeformableDesc {
    * Points besides the vertices of triangles and edges, U32 or U64.
    */
   struct SgnView points;
+} SgnMesh;
+
+/**
+ * A body of free vertices whose dynamics are the host's. Fill with `sgn_deformable_desc_init`.
+ */
+typedef struct SgnDeformableDesc {
+  /**
+   * Set by the init function.
+   */
+  uint32_t struct_size;
+  /**
+   * An `SGN_PRECISION_` constant. Default: F64.
+   */
+  SgnPrecision precision;
+  /**
+   * What all bodies have in common.
+   */
+  struct SgnBodyOptions options;
+  /**
+   * The mesh at its start positions.
+   */
+  struct SgnMesh mesh;
+  /**
+   * Rest positions, as many as vertices; empty: the start positions.
+   */
+  struct SgnView rest_positions;
   /**
    * Lumped masses, F32 or F64, one per vertex, positive.
    */
@@ -1098,50 +1116,17 @@ typedef struct SgnRigidDesc {
    */
   SgnPrecision precision;
   /**
-   * `SGN_BODY_` flags. Default: 0.
+   * What all bodies have in common.
    */
-  uint64_t flags;
-  /**
-   * Half of the thickness of a pair, in the host's unit of length: two bodies keep the sum of their halves apart.
-   * Negative: a tenth of the mean edge length. Default: -1.
-   */
-  double half_thickness;
-  /**
-   * Material; null: frictionless. Default: null.
-   */
-  struct SgnMaterialId material;
-  /**
-   * Groups that the body belongs to, a bit each. Default: 1.
-   */
-  uint64_t groups;
-  /**
-   * Groups that it collides with; two bodies collide when each has a group of the other in its mask. Default: all.
-   */
-  uint64_t mask;
-  /**
-   * A number of the host's, handed back by `sgn_body_info`. Default: 0.
-   */
-  uint64_t user_key;
+  struct SgnBodyOptions options;
   /**
    * A shape, or NULL for a mesh; read during the call.
    */
   const struct SgnShapeDesc *shape;
   /**
-   * Vertices of a mesh in the body frame, about the centre of mass, F32X3 or F64X3.
+   * A mesh in the body frame, about the centre of mass.
    */
-  struct SgnView vertices;
-  /**
-   * As for a deformable body.
-   */
-  struct SgnView triangles;
-  /**
-   * As for a deformable body.
-   */
-  struct SgnView edges;
-  /**
-   * As for a deformable body.
-   */
-  struct SgnView points;
+  struct SgnMesh mesh;
   /**
    * Mass, positive. Default: 1.
    */
@@ -1181,50 +1166,17 @@ typedef struct SgnKinematicDesc {
    */
   SgnPrecision precision;
   /**
-   * `SGN_BODY_` flags. Default: 0.
+   * What all bodies have in common.
    */
-  uint64_t flags;
-  /**
-   * Half of the thickness of a pair, in the host's unit of length: two bodies keep the sum of their halves apart.
-   * Negative: a tenth of the mean edge length. Default: -1.
-   */
-  double half_thickness;
-  /**
-   * Material; null: frictionless. Default: null.
-   */
-  struct SgnMaterialId material;
-  /**
-   * Groups that the body belongs to, a bit each. Default: 1.
-   */
-  uint64_t groups;
-  /**
-   * Groups that it collides with; two bodies collide when each has a group of the other in its mask. Default: all.
-   */
-  uint64_t mask;
-  /**
-   * A number of the host's, handed back by `sgn_body_info`. Default: 0.
-   */
-  uint64_t user_key;
+  struct SgnBodyOptions options;
   /**
    * A shape, or NULL for a mesh; read during the call.
    */
   const struct SgnShapeDesc *shape;
   /**
-   * Vertices of a mesh, F32X3 or F64X3: start positions, or with `SGN_BODY_POSED` in the body frame.
+   * A mesh at its start positions, or with `SGN_BODY_POSED` in the body frame.
    */
-  struct SgnView vertices;
-  /**
-   * As for a deformable body.
-   */
-  struct SgnView triangles;
-  /**
-   * As for a deformable body.
-   */
-  struct SgnView edges;
-  /**
-   * As for a deformable body.
-   */
-  struct SgnView points;
+  struct SgnMesh mesh;
   /**
    * Origin of the body frame at the start; read with `SGN_BODY_POSED` or a shape. Default: the origin.
    */
@@ -1249,30 +1201,9 @@ typedef struct SgnHalfSpaceDesc {
    */
   SgnPrecision precision;
   /**
-   * `SGN_BODY_` flags. Default: 0.
+   * What all bodies have in common.
    */
-  uint64_t flags;
-  /**
-   * Half of the thickness of a pair, in the host's unit of length: two bodies keep the sum of their halves apart.
-   * Negative: 0. Default: -1.
-   */
-  double half_thickness;
-  /**
-   * Material; null: frictionless. Default: null.
-   */
-  struct SgnMaterialId material;
-  /**
-   * Groups that the body belongs to, a bit each. Default: 1.
-   */
-  uint64_t groups;
-  /**
-   * Groups that it collides with; two bodies collide when each has a group of the other in its mask. Default: all.
-   */
-  uint64_t mask;
-  /**
-   * A number of the host's, handed back by `sgn_body_info`. Default: 0.
-   */
-  uint64_t user_key;
+  struct SgnBodyOptions options;
   /**
    * Towards the free side; made a unit vector. Default: 0 0 1.
    */

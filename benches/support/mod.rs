@@ -8,6 +8,7 @@
 //! * `nearby`: close pairs by a plain grid search, independent of the library's detection
 //! * `host`, `scenes`: a world that asks the library for its steps, and the worlds of the measurements
 //! * `clock`: processor time
+//! * `random`: numbers with a fixed sequence per seed
 //! * `record`: the contact problem a host is about to hand over
 //! * `problem`: a contact problem as a value: assembled from a state, written to and read from files
 
@@ -20,6 +21,7 @@ pub mod host;
 pub mod membrane;
 pub mod nearby;
 pub mod problem;
+pub mod random;
 pub mod record;
 pub mod scenes;
 pub mod shapes;

@@ -19,10 +19,10 @@ void cloth_contact_create(ClothContact *contact, SignoriniHost *host, HostCloth 
         exit(1);
     }
     sgn_deformable_desc_init(&desc, sizeof desc);
-    desc.material = host->material;
-    desc.half_thickness = half_thickness;
-    desc.positions = signorini_view(SGN_FORMAT_F64X3, cloth->positions, n);
-    desc.triangles = signorini_view(SGN_FORMAT_U32X3, cloth->triangles, cloth->triangle_count);
+    desc.options.material = host->material;
+    desc.options.half_thickness = half_thickness;
+    desc.mesh.vertices = signorini_view(SGN_FORMAT_F64X3, cloth->positions, n);
+    desc.mesh.triangles = signorini_view(SGN_FORMAT_U32X3, cloth->triangles, cloth->triangle_count);
     desc.masses = signorini_view(SGN_FORMAT_F64, cloth->masses, n);
     desc.pinned = signorini_view(SGN_FORMAT_U8, cloth->pinned, n);
     signorini_host_expect(host, sgn_deformable_create(host->world, &desc, &contact->body), "the cloth");

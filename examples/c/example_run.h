@@ -1,18 +1,15 @@
-/* Runs of an example host: arguments, seeds, expectations, frames, and the summary line. */
+/* Runs of an example scene: arguments, seeds, the host loop of a cloth and one rigid body, expectations, frames, and the
+ * summary line. */
 #ifndef EXAMPLE_RUN_H
 #define EXAMPLE_RUN_H
 
-#include "host_cloth.h"
-#include "signorini_host.h"
+#include "cloth_contact.h"
+#include "example_engine.h"
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 typedef struct ExampleRun {
-    const char *name;
+    char name[64]; /* of the engine and the scene */
     int runs, index; /* index counts from 1 */
     uint64_t seed;
     uint64_t random;    /* state for host_random, another for each run */
@@ -21,22 +18,39 @@ typedef struct ExampleRun {
     SignoriniHost totals; /* sums over all runs; no world */
 } ExampleRun;
 
-/* Reads `[RUNS [SEED]] [--frames FOLDER]`; 0 with a line on stderr if it is none of that. */
-int example_begin(ExampleRun *example, const char *name, int argc, char **argv);
-/* Goes to the next run; 0 when there is none. */
-int example_next(ExampleRun *example);
-/* Counts a failure and says so. Returns 0. */
-int example_fail(ExampleRun *example, const char *what);
-/* Fails, and clears `good`, unless `holds`. */
-void example_expect(ExampleRun *example, int *good, int holds, const char *what);
-/* FOLDER/frame_0000.obj and so on, the cloth and one rigid body; 0 on failure. Nothing after the first run. */
-int example_write_frame(ExampleRun *example, int frame, const HostCloth *cloth, const SignoriniHost *host, SgnBodyId body,
-                        const char *body_name);
-/* Prints `PASS name: ...` or `FAIL name: ...`; the exit status. */
-int example_end(ExampleRun *example);
+/* What a scene consists of. */
+typedef struct ExampleScene {
+    ExampleRun *run;
+    SignoriniHost host;
+    HostCloth *cloth;
+    ClothContact cloth_contact;
+    Engine *engine;
+    EngineState body; /* after the last step */
+    int step;
+    int good; /* 0 once an expectation of this run has failed */
+} ExampleScene;
 
-#ifdef __cplusplus
-}
-#endif
+/* Runs `one_run` as often as the arguments `[RUNS [SEED]] [--frames FOLDER]` say; the exit status. */
+int example_main(const char *scene, int (*one_run)(ExampleRun *), int argc, char **argv);
+/* Random number in [-1, 1]. */
+double example_random(ExampleRun *run);
+/* Counts a failure and says so. Returns 0. */
+int example_fail(ExampleRun *run, const char *what);
+
+/* A cloth whose vertices lie up to a millimetre beside the grid, so that no two runs are alike; NULL without memory. */
+HostCloth *example_cloth(ExampleRun *run, const HostClothSettings *settings);
+/* Takes the cloth over and puts the body beside it, gravity as the cloth has it. 0 on failure, with nothing to close. */
+int example_open(ExampleScene *scene, ExampleRun *run, HostCloth *cloth, ClothMetric metric, const EngineBody *body,
+                 double friction, double half_thickness);
+/* One step of the host loop, and its frame. 0 once the run has failed. */
+int example_step(ExampleScene *scene, double dt);
+/* Fails unless the body is on its side of the cloth: above it, y up. */
+void example_expect_above(ExampleScene *scene);
+/* Fails unless `holds`. */
+void example_expect(ExampleScene *scene, int holds, const char *what);
+/* Expects that every frame was certified and that the engine handed the pair over; frees. Whether the run was good. */
+int example_close(ExampleScene *scene);
+
+double example_length(const double v[3]);
 
 #endif

@@ -22,8 +22,8 @@ int main(void) {
   sgn_half_space_desc_init(&plane, sizeof plane); /* the half-space z >= 0 */
   if (sgn_half_space_create(world, &plane, &ground)) return 1;
   sgn_deformable_desc_init(&desc, sizeof desc);
-  desc.positions = sgn_view(SGN_FORMAT_F64X3, x, 9);
-  desc.triangles = sgn_view(SGN_FORMAT_U32X3, triangles, 8);
+  desc.mesh.vertices = sgn_view(SGN_FORMAT_F64X3, x, 9);
+  desc.mesh.triangles = sgn_view(SGN_FORMAT_U32X3, triangles, 8);
   desc.masses = sgn_view(SGN_FORMAT_F64, mass, 9);
   if (sgn_deformable_create(world, &desc, &cloth)) return 1;
   sgn_step_desc_init(&step, sizeof step);

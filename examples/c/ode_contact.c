@@ -109,14 +109,14 @@ void ode_contact_create(OdeContact *contact, SignoriniHost *host, dBodyID body, 
 
 void ode_contact_push(OdeContact *contact, double dt)
 {
-    double end[7], linear[3], angular[3];
+    double end[7], angular[3];
     int i;
 
     read_pose(contact->body, end);
     for (i = 0; i < 3; i++)
-        linear[i] = (end[i] - contact->start[i]) / dt;
+        contact->displacement_velocity[i] = (end[i] - contact->start[i]) / dt;
     host_angular_velocity(contact->start + 3, end + 3, dt, angular);
-    signorini_host_push_velocity(contact->host, contact->id, linear, angular);
+    signorini_host_push_velocity(contact->host, contact->id, contact->displacement_velocity, angular);
 }
 
 void ode_contact_pull(OdeContact *contact)

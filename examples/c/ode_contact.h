@@ -34,6 +34,7 @@ typedef struct OdeContact {
     dBodyID body;
     SgnBodyId id;
     double start[7]; /* x y z, quaternion x y z w: where our last step left it */
+    double displacement_velocity[3]; /* last pushed */
 } OdeContact;
 
 /* Mass, inertia and pose of the body go into `desc`, which brings the shape. */

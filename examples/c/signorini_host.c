@@ -75,7 +75,7 @@ void signorini_host_destroy(SignoriniHost *host)
 SgnBodyId signorini_host_add_rigid(SignoriniHost *host, SgnRigidDesc *desc)
 {
     SgnBodyId id;
-    desc->material = host->material;
+    desc->options.material = host->material;
     signorini_host_expect(host, sgn_rigid_create(host->world, desc, &id), "the rigid body");
     return id;
 }

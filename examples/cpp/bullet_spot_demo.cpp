@@ -118,7 +118,7 @@ void add_floor(SignoriniHost &host)
     SgnBodyId id;
     sgn_half_space_desc_init(&desc, sizeof desc);
     desc.normal[0] = 0.0, desc.normal[1] = 1.0, desc.normal[2] = 0.0;
-    desc.material = host.material;
+    desc.options.material = host.material;
     signorini_host_expect(&host, sgn_half_space_create(host.world, &desc, &id), "the floor");
 }
 
@@ -176,9 +176,9 @@ int run(const Options &options)
     BulletContact spot_contact(&host, body);
     SgnRigidDesc desc;
     sgn_rigid_desc_init(&desc, sizeof desc);
-    desc.vertices = signorini_view(SGN_FORMAT_F64X3, spot.vertices.data(), spot.vertices.size() / 3);
-    desc.triangles = signorini_view(SGN_FORMAT_U32X3, spot.triangles.data(), spot.triangles.size() / 3);
-    desc.half_thickness = HALF_THICKNESS;
+    desc.mesh.vertices = signorini_view(SGN_FORMAT_F64X3, spot.vertices.data(), spot.vertices.size() / 3);
+    desc.mesh.triangles = signorini_view(SGN_FORMAT_U32X3, spot.triangles.data(), spot.triangles.size() / 3);
+    desc.options.half_thickness = HALF_THICKNESS;
     spot_contact.describe(desc);
     spot_contact.attach(signorini_host_add_rigid(&host, &desc));
 

@@ -1,334 +1,17 @@
 //! Bodies: creation, removal, filters, what they consist of.
 
 use super::boundary::{call, change, look};
-use super::shape::{SgnShapeDesc, tessellated};
-use super::status::{Failure, SGN_ERROR_INVALID_ARGUMENT, SGN_ERROR_NON_FINITE_INPUT, SGN_OK, SgnResult};
+use super::description::{
+    SGN_BODY_INERTIA_IN_WORLD, SGN_BODY_NO_SELF_COLLISION, SGN_BODY_POSED, SgnDeformableDesc, SgnHalfSpaceDesc,
+    SgnKinematicDesc, SgnRigidDesc,
+};
+use super::status::{Failure, SGN_OK, SgnResult};
 use super::structs::{self, Growing};
-use super::views::{self, SgnView};
+use super::views;
 use super::world::{SgnBodyId, SgnMaterialId, SgnWorld};
 use crate::kinematics::Pose;
-use crate::math::Vec3;
-use crate::model::{HalfSpace, Precision};
-use crate::world::{BodyKind, BodyOptions, DeformableDescription, KinematicDescription, RigidDescription, Topology};
-
-/// Number format in which a host takes the end state of a body. The state is certified after rounding to it, and
-/// positions and poses are pulled in it.
-pub type SgnPrecision = i32;
-/// `double`. The default.
-pub const SGN_PRECISION_F64: i32 = 0;
-/// `float`
-pub const SGN_PRECISION_F32: i32 = 1;
-
-/// Flag of a deformable body: it does not collide with itself.
-pub const SGN_BODY_NO_SELF_COLLISION: u64 = 1;
-/// Flag of a rigid body: the inertia is given in world axes at the start pose, not in the body frame.
-pub const SGN_BODY_INERTIA_IN_WORLD: u64 = 2;
-/// Flag of a kinematic mesh: it moves from pose to pose, its vertices are in the body frame. Always so with a shape.
-pub const SGN_BODY_POSED: u64 = 4;
-
-/// What every description has in common, as the host gives it.
-struct CommonFields {
-    precision: SgnPrecision,
-    flags: u64,
-    half_thickness: f64,
-    material: SgnMaterialId,
-    groups: u64,
-    mask: u64,
-    user_key: u64,
-}
-
-/// The common fields of a description; the structs of the header are flat, so that each can grow on its own.
-macro_rules! common_fields {
-    ($desc:expr) => {
-        CommonFields {
-            precision: $desc.precision,
-            flags: $desc.flags,
-            half_thickness: $desc.half_thickness,
-            material: $desc.material,
-            groups: $desc.groups,
-            mask: $desc.mask,
-            user_key: $desc.user_key,
-        }
-    };
-}
-
-impl CommonFields {
-    fn options(&self, allowed: u64) -> Result<BodyOptions, Failure> {
-        let invalid = |what: &str, value: f64| {
-            Failure::new(SGN_ERROR_INVALID_ARGUMENT, format!("{what} {value} is out of range")).value(value)
-        };
-        if self.flags & !allowed != 0 {
-            return Err(invalid("flags", (self.flags & !allowed) as f64));
-        }
-        if !self.half_thickness.is_finite() {
-            let message = "the half thickness is not finite";
-            return Err(Failure::new(SGN_ERROR_NON_FINITE_INPUT, message).value(self.half_thickness));
-        }
-        let precision = match self.precision {
-            SGN_PRECISION_F64 => Precision::Double,
-            SGN_PRECISION_F32 => Precision::Single,
-            other => return Err(invalid("precision", f64::from(other))),
-        };
-        Ok(BodyOptions {
-            half_thickness: (self.half_thickness >= 0.0).then_some(self.half_thickness),
-            material: self.material.value,
-            groups: self.groups,
-            mask: self.mask,
-            self_collision: self.flags & SGN_BODY_NO_SELF_COLLISION == 0,
-            precision,
-            user_key: self.user_key,
-        })
-    }
-}
-
-/// A body of free vertices whose dynamics are the host's. Fill with `sgn_deformable_desc_init`.
-///
-/// Triangles, edges and points say what collides; edges of triangles need not be given. All three empty: every vertex is
-/// a point.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct SgnDeformableDesc {
-    /// Set by the init function.
-    pub struct_size: u32,
-    /// An `SGN_PRECISION_` constant. Default: F64.
-    pub precision: SgnPrecision,
-    /// `SGN_BODY_` flags. Default: 0.
-    pub flags: u64,
-    /// Half of the thickness of a pair, in the host's unit of length: two bodies keep the sum of their halves apart.
-    /// Negative: a tenth of the mean edge length. Default: -1.
-    pub half_thickness: f64,
-    /// Material; null: frictionless. Default: null.
-    pub material: SgnMaterialId,
-    /// Groups that the body belongs to, a bit each. Default: 1.
-    pub groups: u64,
-    /// Groups that it collides with; two bodies collide when each has a group of the other in its mask. Default: all.
-    pub mask: u64,
-    /// A number of the host's, handed back by `sgn_body_info`. Default: 0.
-    pub user_key: u64,
-    /// Start positions, F32X3 or F64X3. They say how many vertices there are.
-    pub positions: SgnView,
-    /// Rest positions, as many; empty: the start positions.
-    pub rest_positions: SgnView,
-    /// Triangles, U32X3 or U64X3, either winding.
-    pub triangles: SgnView,
-    /// Edges besides those of triangles, U32X2 or U64X2.
-    pub edges: SgnView,
-    /// Points besides the vertices of triangles and edges, U32 or U64.
-    pub points: SgnView,
-    /// Lumped masses, F32 or F64, one per vertex, positive.
-    pub masses: SgnView,
-    /// U8 per vertex: not 0 where the vertex follows its displacement velocity exactly. Empty: none does.
-    pub pinned: SgnView,
-}
-
-// SAFETY: repr(C) without padding; numbers and pointers.
-unsafe impl Growing for SgnDeformableDesc {
-    const NAME: &'static str = "SgnDeformableDesc";
-    const FIRST_SIZE: usize = 336;
-    fn defaults() -> Self {
-        SgnDeformableDesc {
-            struct_size: 0,
-            precision: SGN_PRECISION_F64,
-            flags: 0,
-            half_thickness: -1.0,
-            material: SgnMaterialId { value: 0 },
-            groups: 1,
-            mask: u64::MAX,
-            user_key: 0,
-            positions: SgnView::EMPTY,
-            rest_positions: SgnView::EMPTY,
-            triangles: SgnView::EMPTY,
-            edges: SgnView::EMPTY,
-            points: SgnView::EMPTY,
-            masses: SgnView::EMPTY,
-            pinned: SgnView::EMPTY,
-        }
-    }
-}
-
-/// A rigid body whose dynamics are the host's: a mesh or a shape. Fill with `sgn_rigid_desc_init`.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct SgnRigidDesc {
-    /// Set by the init function.
-    pub struct_size: u32,
-    /// An `SGN_PRECISION_` constant. Default: F64.
-    pub precision: SgnPrecision,
-    /// `SGN_BODY_` flags. Default: 0.
-    pub flags: u64,
-    /// Half of the thickness of a pair, in the host's unit of length: two bodies keep the sum of their halves apart.
-    /// Negative: a tenth of the mean edge length. Default: -1.
-    pub half_thickness: f64,
-    /// Material; null: frictionless. Default: null.
-    pub material: SgnMaterialId,
-    /// Groups that the body belongs to, a bit each. Default: 1.
-    pub groups: u64,
-    /// Groups that it collides with; two bodies collide when each has a group of the other in its mask. Default: all.
-    pub mask: u64,
-    /// A number of the host's, handed back by `sgn_body_info`. Default: 0.
-    pub user_key: u64,
-    /// A shape, or NULL for a mesh; read during the call.
-    pub shape: *const SgnShapeDesc,
-    /// Vertices of a mesh in the body frame, about the centre of mass, F32X3 or F64X3.
-    pub vertices: SgnView,
-    /// As for a deformable body.
-    pub triangles: SgnView,
-    /// As for a deformable body.
-    pub edges: SgnView,
-    /// As for a deformable body.
-    pub points: SgnView,
-    /// Mass, positive. Default: 1.
-    pub mass: f64,
-    /// Inertia about the centre of mass, 3x3, symmetric, positive definite. Default: the identity.
-    pub inertia: [f64; 9],
-    /// Centre of mass at the start. Default: the origin.
-    pub position: [f64; 3],
-    /// Orientation at the start, quaternion x y z w; made a unit one. Default: 0 0 0 1.
-    pub orientation: [f64; 4],
-    /// Displacement velocity of the centre of mass. Default: 0.
-    pub velocity: [f64; 3],
-    /// Angular displacement velocity, world axes, radians per time. Default: 0.
-    pub angular_velocity: [f64; 3],
-}
-
-// SAFETY: repr(C) without padding; numbers and pointers.
-unsafe impl Growing for SgnRigidDesc {
-    const NAME: &'static str = "SgnRigidDesc";
-    const FIRST_SIZE: usize = 408;
-    fn defaults() -> Self {
-        SgnRigidDesc {
-            struct_size: 0,
-            precision: SGN_PRECISION_F64,
-            flags: 0,
-            half_thickness: -1.0,
-            material: SgnMaterialId { value: 0 },
-            groups: 1,
-            mask: u64::MAX,
-            user_key: 0,
-            shape: std::ptr::null(),
-            vertices: SgnView::EMPTY,
-            triangles: SgnView::EMPTY,
-            edges: SgnView::EMPTY,
-            points: SgnView::EMPTY,
-            mass: 1.0,
-            inertia: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            position: [0.0; 3],
-            orientation: [0.0, 0.0, 0.0, 1.0],
-            velocity: [0.0; 3],
-            angular_velocity: [0.0; 3],
-        }
-    }
-}
-
-/// A body of prescribed motion and infinite mass: a mesh or a shape. Fill with `sgn_kinematic_desc_init`.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct SgnKinematicDesc {
-    /// Set by the init function.
-    pub struct_size: u32,
-    /// An `SGN_PRECISION_` constant. Default: F64.
-    pub precision: SgnPrecision,
-    /// `SGN_BODY_` flags. Default: 0.
-    pub flags: u64,
-    /// Half of the thickness of a pair, in the host's unit of length: two bodies keep the sum of their halves apart.
-    /// Negative: a tenth of the mean edge length. Default: -1.
-    pub half_thickness: f64,
-    /// Material; null: frictionless. Default: null.
-    pub material: SgnMaterialId,
-    /// Groups that the body belongs to, a bit each. Default: 1.
-    pub groups: u64,
-    /// Groups that it collides with; two bodies collide when each has a group of the other in its mask. Default: all.
-    pub mask: u64,
-    /// A number of the host's, handed back by `sgn_body_info`. Default: 0.
-    pub user_key: u64,
-    /// A shape, or NULL for a mesh; read during the call.
-    pub shape: *const SgnShapeDesc,
-    /// Vertices of a mesh, F32X3 or F64X3: start positions, or with `SGN_BODY_POSED` in the body frame.
-    pub vertices: SgnView,
-    /// As for a deformable body.
-    pub triangles: SgnView,
-    /// As for a deformable body.
-    pub edges: SgnView,
-    /// As for a deformable body.
-    pub points: SgnView,
-    /// Origin of the body frame at the start; read with `SGN_BODY_POSED` or a shape. Default: the origin.
-    pub position: [f64; 3],
-    /// Orientation at the start, likewise; quaternion x y z w. Default: 0 0 0 1.
-    pub orientation: [f64; 4],
-}
-
-// SAFETY: repr(C) without padding; numbers and pointers.
-unsafe impl Growing for SgnKinematicDesc {
-    const NAME: &'static str = "SgnKinematicDesc";
-    const FIRST_SIZE: usize = 280;
-    fn defaults() -> Self {
-        SgnKinematicDesc {
-            struct_size: 0,
-            precision: SGN_PRECISION_F64,
-            flags: 0,
-            half_thickness: -1.0,
-            material: SgnMaterialId { value: 0 },
-            groups: 1,
-            mask: u64::MAX,
-            user_key: 0,
-            shape: std::ptr::null(),
-            vertices: SgnView::EMPTY,
-            triangles: SgnView::EMPTY,
-            edges: SgnView::EMPTY,
-            points: SgnView::EMPTY,
-            position: [0.0; 3],
-            orientation: [0.0, 0.0, 0.0, 1.0],
-        }
-    }
-}
-
-/// A half-space of infinite mass: points with `normal . x >= offset` are free. Fill with `sgn_half_space_desc_init`.
-/// Deformable and rigid bodies collide with it; kinematic ones do not.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct SgnHalfSpaceDesc {
-    /// Set by the init function.
-    pub struct_size: u32,
-    /// An `SGN_PRECISION_` constant. Default: F64.
-    pub precision: SgnPrecision,
-    /// `SGN_BODY_` flags. Default: 0.
-    pub flags: u64,
-    /// Half of the thickness of a pair, in the host's unit of length: two bodies keep the sum of their halves apart.
-    /// Negative: 0. Default: -1.
-    pub half_thickness: f64,
-    /// Material; null: frictionless. Default: null.
-    pub material: SgnMaterialId,
-    /// Groups that the body belongs to, a bit each. Default: 1.
-    pub groups: u64,
-    /// Groups that it collides with; two bodies collide when each has a group of the other in its mask. Default: all.
-    pub mask: u64,
-    /// A number of the host's, handed back by `sgn_body_info`. Default: 0.
-    pub user_key: u64,
-    /// Towards the free side; made a unit vector. Default: 0 0 1.
-    pub normal: [f64; 3],
-    /// Distance of the plane from the origin along the unit normal. Default: 0.
-    pub offset: f64,
-}
-
-// SAFETY: repr(C) without padding; numbers.
-unsafe impl Growing for SgnHalfSpaceDesc {
-    const NAME: &'static str = "SgnHalfSpaceDesc";
-    const FIRST_SIZE: usize = 88;
-    fn defaults() -> Self {
-        SgnHalfSpaceDesc {
-            struct_size: 0,
-            precision: SGN_PRECISION_F64,
-            flags: 0,
-            half_thickness: -1.0,
-            material: SgnMaterialId { value: 0 },
-            groups: 1,
-            mask: u64::MAX,
-            user_key: 0,
-            normal: [0.0, 0.0, 1.0],
-            offset: 0.0,
-        }
-    }
-}
+use crate::model::HalfSpace;
+use crate::world::{BodyKind, DeformableDescription, KinematicDescription, RigidDescription, World};
 
 /// Kind of a body.
 pub type SgnBodyKind = i32;
@@ -383,42 +66,6 @@ unsafe impl Growing for SgnBodyInfo {
     }
 }
 
-/// Fills `desc` with defaults; `size` is `sizeof(SgnDeformableDesc)`.
-///
-/// Thread: any. Errors: NULL_ARGUMENT, BAD_STRUCT.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sgn_deformable_desc_init(desc: *mut SgnDeformableDesc, size: usize) -> SgnResult {
-    // SAFETY: the caller vouches for `size` bytes.
-    call(|| unsafe { structs::init(desc, size) })
-}
-
-/// Fills `desc` with defaults; `size` is `sizeof(SgnRigidDesc)`.
-///
-/// Thread: any. Errors: NULL_ARGUMENT, BAD_STRUCT.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sgn_rigid_desc_init(desc: *mut SgnRigidDesc, size: usize) -> SgnResult {
-    // SAFETY: the caller vouches for `size` bytes.
-    call(|| unsafe { structs::init(desc, size) })
-}
-
-/// Fills `desc` with defaults; `size` is `sizeof(SgnKinematicDesc)`.
-///
-/// Thread: any. Errors: NULL_ARGUMENT, BAD_STRUCT.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sgn_kinematic_desc_init(desc: *mut SgnKinematicDesc, size: usize) -> SgnResult {
-    // SAFETY: the caller vouches for `size` bytes.
-    call(|| unsafe { structs::init(desc, size) })
-}
-
-/// Fills `desc` with defaults; `size` is `sizeof(SgnHalfSpaceDesc)`.
-///
-/// Thread: any. Errors: NULL_ARGUMENT, BAD_STRUCT.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sgn_half_space_desc_init(desc: *mut SgnHalfSpaceDesc, size: usize) -> SgnResult {
-    // SAFETY: the caller vouches for `size` bytes.
-    call(|| unsafe { structs::init(desc, size) })
-}
-
 /// Fills `info` with zeros and its size; `size` is `sizeof(SgnBodyInfo)`.
 ///
 /// Thread: any. Errors: NULL_ARGUMENT, BAD_STRUCT.
@@ -428,39 +75,28 @@ pub unsafe extern "C" fn sgn_body_info_init(info: *mut SgnBodyInfo, size: usize)
     call(|| unsafe { structs::init(info, size) })
 }
 
-unsafe fn topology(triangles: &SgnView, edges: &SgnView, points: &SgnView) -> Result<Topology, Failure> {
-    let mut topology = Topology::default();
-    // SAFETY: the caller vouches for the views.
+/// The body of a create function: reads the description, adds the body, writes its id.
+///
+/// # Safety
+/// `world` is NULL or a live world, `desc` and `out` are NULL or valid.
+unsafe fn create<T: Growing>(
+    world: *mut SgnWorld,
+    function: &str,
+    desc: *const T,
+    out: *mut SgnBodyId,
+    add: impl FnOnce(&mut World, T) -> Result<u64, Failure>,
+) -> SgnResult {
+    // SAFETY: passed on.
     unsafe {
-        if !triangles.is_absent() {
-            topology.triangles = views::indices::<3>(triangles, "triangles")?;
-        }
-        if !edges.is_absent() {
-            topology.edges = views::indices::<2>(edges, "edges")?;
-        }
-        if !points.is_absent() {
-            topology.points = views::indices::<1>(points, "points")?.into_iter().flatten().collect();
-        }
-    }
-    Ok(topology)
-}
-
-/// Vertices and topology of a mesh, or of a shape if there is one.
-unsafe fn geometry(
-    shape: *const SgnShapeDesc,
-    vertices: &SgnView,
-    [triangles, edges, points]: [&SgnView; 3],
-) -> Result<(Vec<Vec3>, Topology), Failure> {
-    // SAFETY: the caller vouches for the pointers.
-    unsafe {
-        if shape.is_null() {
-            return Ok((views::floats::<3>(vertices, "vertices")?, topology(triangles, edges, points)?));
-        }
-        if [vertices, triangles, edges, points].iter().any(|view| !view.is_absent()) {
-            return Err(Failure::new(SGN_ERROR_INVALID_ARGUMENT, "a shape and a mesh are given: only one is wanted"));
-        }
-        let (vertices, triangles) = tessellated(&structs::read(shape)?)?;
-        Ok((vertices, Topology { triangles, ..Topology::default() }))
+        change(world, function, |world, _| {
+            let desc = structs::read(desc)?;
+            if out.is_null() {
+                return Err(Failure::null("out"));
+            }
+            let value = add(world, desc)?;
+            out.write_unaligned(SgnBodyId { value });
+            Ok(SGN_OK)
+        })
     }
 }
 
@@ -477,15 +113,12 @@ pub unsafe extern "C" fn sgn_deformable_create(
 ) -> SgnResult {
     // SAFETY: the caller vouches for the pointers and views.
     unsafe {
-        change(world, "sgn_deformable_create", |world, _| {
-            let desc = structs::read(desc)?;
-            if out.is_null() {
-                return Err(Failure::null("out"));
-            }
+        create(world, "sgn_deformable_create", desc, out, |world, desc| {
+            let (positions, topology) = desc.mesh.read()?;
             let mut description = DeformableDescription {
-                options: common_fields!(desc).options(SGN_BODY_NO_SELF_COLLISION)?,
-                positions: views::floats::<3>(&desc.positions, "positions")?,
-                topology: topology(&desc.triangles, &desc.edges, &desc.points)?,
+                options: desc.options.checked(desc.precision, SGN_BODY_NO_SELF_COLLISION)?,
+                positions,
+                topology,
                 masses: views::scalars(&desc.masses, "masses")?,
                 ..DeformableDescription::default()
             };
@@ -495,9 +128,7 @@ pub unsafe extern "C" fn sgn_deformable_create(
             if !desc.pinned.is_absent() {
                 description.pinned = views::flags(&desc.pinned, "pinned")?;
             }
-            let value = world.add_deformable(description)?;
-            out.write_unaligned(SgnBodyId { value });
-            Ok(SGN_OK)
+            Ok(world.add_deformable(description)?)
         })
     }
 }
@@ -513,27 +144,20 @@ pub unsafe extern "C" fn sgn_rigid_create(
 ) -> SgnResult {
     // SAFETY: the caller vouches for the pointers and views.
     unsafe {
-        change(world, "sgn_rigid_create", |world, _| {
-            let desc = structs::read(desc)?;
-            if out.is_null() {
-                return Err(Failure::null("out"));
-            }
-            let lists = [&desc.triangles, &desc.edges, &desc.points];
-            let (vertices, topology) = geometry(desc.shape, &desc.vertices, lists)?;
+        create(world, "sgn_rigid_create", desc, out, |world, desc| {
+            let (vertices, topology) = desc.mesh.or_shape(desc.shape)?;
             let [a, b, c, d, e, f, g, h, i] = desc.inertia;
-            let value = world.add_rigid(RigidDescription {
-                options: common_fields!(desc).options(SGN_BODY_INERTIA_IN_WORLD)?,
+            Ok(world.add_rigid(RigidDescription {
+                options: desc.options.checked(desc.precision, SGN_BODY_INERTIA_IN_WORLD)?,
                 vertices,
                 topology,
                 mass: desc.mass,
                 inertia: [[a, b, c], [d, e, f], [g, h, i]],
-                inertia_in_world: desc.flags & SGN_BODY_INERTIA_IN_WORLD != 0,
+                inertia_in_world: desc.options.flags & SGN_BODY_INERTIA_IN_WORLD != 0,
                 pose: Pose { position: desc.position, orientation: desc.orientation },
                 velocity: desc.velocity,
                 angular_velocity: desc.angular_velocity,
-            })?;
-            out.write_unaligned(SgnBodyId { value });
-            Ok(SGN_OK)
+            })?)
         })
     }
 }
@@ -549,23 +173,16 @@ pub unsafe extern "C" fn sgn_kinematic_create(
 ) -> SgnResult {
     // SAFETY: the caller vouches for the pointers and views.
     unsafe {
-        change(world, "sgn_kinematic_create", |world, _| {
-            let desc = structs::read(desc)?;
-            if out.is_null() {
-                return Err(Failure::null("out"));
-            }
-            let lists = [&desc.triangles, &desc.edges, &desc.points];
-            let (vertices, topology) = geometry(desc.shape, &desc.vertices, lists)?;
-            let posed = !desc.shape.is_null() || desc.flags & SGN_BODY_POSED != 0;
+        create(world, "sgn_kinematic_create", desc, out, |world, desc| {
+            let (vertices, topology) = desc.mesh.or_shape(desc.shape)?;
+            let posed = !desc.shape.is_null() || desc.options.flags & SGN_BODY_POSED != 0;
             let pose = Pose { position: desc.position, orientation: desc.orientation };
-            let value = world.add_kinematic(KinematicDescription {
-                options: common_fields!(desc).options(SGN_BODY_POSED)?,
+            Ok(world.add_kinematic(KinematicDescription {
+                options: desc.options.checked(desc.precision, SGN_BODY_POSED)?,
                 vertices,
                 topology,
                 pose: posed.then_some(pose),
-            })?;
-            out.write_unaligned(SgnBodyId { value });
-            Ok(SGN_OK)
+            })?)
         })
     }
 }
@@ -581,15 +198,9 @@ pub unsafe extern "C" fn sgn_half_space_create(
 ) -> SgnResult {
     // SAFETY: the caller vouches for the pointers.
     unsafe {
-        change(world, "sgn_half_space_create", |world, _| {
-            let desc = structs::read(desc)?;
-            if out.is_null() {
-                return Err(Failure::null("out"));
-            }
+        create(world, "sgn_half_space_create", desc, out, |world, desc| {
             let plane = HalfSpace { normal: desc.normal, offset: desc.offset };
-            let value = world.add_half_space(common_fields!(desc).options(0)?, plane)?;
-            out.write_unaligned(SgnBodyId { value });
-            Ok(SGN_OK)
+            Ok(world.add_half_space(desc.options.checked(desc.precision, 0)?, plane)?)
         })
     }
 }

@@ -6,7 +6,7 @@
 //! * `structs`: structs that grow, by their size
 //! * `views`: strided host memory, read and written element by element
 //! * `version`, `api`: version, capabilities, the table for hosts that load the library themselves
-//! * `context`, `world`, `material`, `body`, `shape`, `drive`, `system`, `step`, `query`: the functions, by noun
+//! * `context`, `world`, `material`, `description`, `body`, `shape`, `drive`, `system`, `step`, `query`: the functions, by noun
 //!
 //! Every export returns a status, runs behind a panic boundary and writes its outputs only when it succeeds. The
 //! header is generated from these files by `tests/capi`, comments included.
@@ -18,6 +18,7 @@ mod api;
 mod body;
 mod boundary;
 mod context;
+mod description;
 mod drive;
 mod float_environment;
 mod material;
@@ -34,6 +35,7 @@ mod world;
 pub use api::*;
 pub use body::*;
 pub use context::*;
+pub use description::*;
 pub use drive::*;
 pub use material::*;
 pub use query::*;

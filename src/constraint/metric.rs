@@ -2,7 +2,9 @@
 
 use crate::kinematics::world_inertia;
 use crate::linalg::BlockMatrix;
-use crate::math::{IDENTITY, Mat3, Vec3, ZERO_MATRIX, add, determinant, inverse, mat_scale, mat_vec, transpose};
+use crate::math::{
+    IDENTITY, Mat3, Vec3, ZERO_MATRIX, add, inverse, is_positive_definite, mat_scale, mat_vec, transpose,
+};
 use crate::model::{BuildError, Drives, Kind, Model, State, StepError, System, SystemDescription};
 use crate::parallel::Par;
 
@@ -201,10 +203,6 @@ fn check_symmetry(matrix: &BlockMatrix) -> Result<(), StepError> {
 
 fn largest(m: &Mat3) -> f64 {
     m.iter().flatten().fold(0.0, |a, v| a.max(v.abs()))
-}
-
-fn is_positive_definite(m: &Mat3) -> bool {
-    m[0][0] > 0.0 && m[0][0] * m[1][1] - m[0][1] * m[1][0] > 0.0 && determinant(m) > 0.0
 }
 
 fn inverse_blocks(model: &Model, matrix: &BlockMatrix, fixed: &[bool]) -> Result<Vec<Mat3>, StepError> {

@@ -160,13 +160,47 @@ pub fn determinant(m: &Mat3) -> f64 {
     dot(m[0], cross(m[1], m[2]))
 }
 
-/// Inverse, or `None` where the determinant is zero or the result is not finite.
+/// Whether a symmetric matrix is positive definite, by its leading minors. It is scaled by its largest entry first, so
+/// that products of very small or large entries neither vanish nor overflow.
+pub fn is_positive_definite(m: &Mat3) -> bool {
+    let size = power_of_size(m);
+    let u = m.map(|row| scale_down(size, row));
+    u[0][0] > 0.0 && u[0][0] * u[1][1] - u[0][1] * u[1][0] > 0.0 && determinant(&u) > 0.0
+}
+
+/// A power of two within a factor of two of the largest entry, so that scaling by it rounds nothing.
+fn power_of_size(m: &Mat3) -> f64 {
+    let largest = m.iter().flatten().fold(0.0, |l: f64, x| l.max(x.abs()));
+    f64::from_bits(largest.to_bits() & f64::INFINITY.to_bits()).max(f64::MIN_POSITIVE)
+}
+
+/// `v / by`; a reciprocal of a denormal would overflow.
+fn scale_down(by: f64, v: Vec3) -> Vec3 {
+    v.map(|x| x / by)
+}
+
+/// Inverse, or `None` where the matrix is singular or the result is not finite.
 #[inline]
 pub fn inverse(m: &Mat3) -> Option<Mat3> {
-    let (c0, c1, c2) = (cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1]));
-    let r = 1.0 / dot(m[0], c0);
-    let out = transpose(&[scale(r, c0), scale(r, c1), scale(r, c2)]);
+    let (out, determinant) = adjugate_by_determinant(m);
+    if determinant.is_normal() && out.iter().all(|row| is_finite(*row)) { Some(out) } else { scaled_inverse(m) }
+}
+
+/// Inverse of a matrix whose determinant vanishes, overflows or loses digits by the size of its entries.
+#[cold]
+fn scaled_inverse(m: &Mat3) -> Option<Mat3> {
+    let size = power_of_size(m);
+    let (out, _) = adjugate_by_determinant(&m.map(|row| scale_down(size, row)));
+    let out = out.map(|row| scale_down(size, row));
     out.iter().all(|row| is_finite(*row)).then_some(out)
+}
+
+#[inline]
+fn adjugate_by_determinant(m: &Mat3) -> (Mat3, f64) {
+    let (c0, c1, c2) = (cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1]));
+    let determinant = dot(m[0], c0);
+    let r = 1.0 / determinant;
+    (transpose(&[scale(r, c0), scale(r, c1), scale(r, c2)]), determinant)
 }
 
 #[cfg(test)]
@@ -183,6 +217,25 @@ mod tests {
             }
         }
         assert!(inverse(&[[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [0.0, 0.0, 1.0]]).is_none());
+    }
+
+    #[test]
+    fn size_alone_makes_no_matrix_singular() {
+        let m = [[4.0, 1.0, 0.5], [1.0, 3.0, -0.2], [0.5, -0.2, 2.0]];
+        for size in [1e-300, 1e-200, 1e-104, 1.0, 1e104, 1e200, 1e300] {
+            let scaled = m.map(|row| scale(size, row));
+            assert!(is_positive_definite(&scaled), "{size}");
+            let p = mat_mul(&scaled, &inverse(&scaled).unwrap_or(ZERO_MATRIX));
+            for i in 0..3 {
+                for j in 0..3 {
+                    assert!((p[i][j] - IDENTITY[i][j]).abs() < 1e-14, "{size}: {p:?}");
+                }
+            }
+        }
+        assert!(!is_positive_definite(&ZERO_MATRIX));
+        assert!(!is_positive_definite(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]));
+        assert!(!is_positive_definite(&[[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]));
+        assert!(inverse(&ZERO_MATRIX).is_none());
     }
 
     #[test]

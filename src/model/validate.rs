@@ -1,7 +1,7 @@
 //! Checks of descriptions: what cannot be built, with key, index and value.
 
 use super::{BodyDescription, BuildError, Kind, Materials, Surface, SystemDescription};
-use crate::math::{determinant, is_finite, norm_squared};
+use crate::math::{determinant, is_finite, is_positive_definite, norm_squared};
 
 fn fail(body: u64, index: usize, value: f64, message: &'static str) -> Result<(), BuildError> {
     Err(BuildError { body, index, value, message })
@@ -78,11 +78,9 @@ fn check_kind(body: &BodyDescription) -> Result<(), BuildError> {
             if mass.is_nan() || *mass <= 0.0 {
                 return fail(body.key, 0, *mass, "mass is not positive");
             }
-            let minor = inertia[0][0] * inertia[1][1] - inertia[0][1] * inertia[1][0];
             let symmetric = (0..3).all(|i| (0..3).all(|j| inertia[i][j] == inertia[j][i]));
-            let positive = inertia[0][0] > 0.0 && minor > 0.0 && determinant(inertia) > 0.0;
             let infinite = mass.is_infinite() || (0..3).any(|i| inertia[i][i] == f64::INFINITY);
-            if !(infinite || positive && symmetric) {
+            if !(infinite || symmetric && is_positive_definite(inertia)) {
                 return fail(body.key, 0, determinant(inertia), "inertia is not symmetric positive definite");
             }
             Ok(())

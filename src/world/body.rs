@@ -404,11 +404,8 @@ fn symmetric(m: Mat3) -> Result<Mat3, WorldError> {
             s[i][j] = 0.5 * m[i][j] + 0.5 * m[j][i];
         }
     }
-    // Scaled, so that products of very small entries do not vanish.
-    let u = s.map(|row| row.map(|x| x / largest));
-    let minor = u[0][0] * u[1][1] - u[0][1] * u[1][0];
-    let determinant = crate::math::determinant(&u);
-    if !(u[0][0] > 0.0 && minor > 0.0 && determinant > 0.0) {
+    if !crate::math::is_positive_definite(&s) {
+        let determinant = crate::math::determinant(&s);
         return Err(WorldError::new(Fault::InvalidArgument, "the inertia is not positive definite").value(determinant));
     }
     Ok(s)

@@ -3,8 +3,21 @@
 use std::path::Path;
 
 /// Files of `src/capi` in the order of the header.
-const SOURCES: [&str; 12] =
-    ["status", "version", "views", "context", "world", "material", "shape", "body", "drive", "system", "step", "query"];
+const SOURCES: [&str; 13] = [
+    "status",
+    "version",
+    "views",
+    "context",
+    "world",
+    "material",
+    "shape",
+    "description",
+    "body",
+    "drive",
+    "system",
+    "step",
+    "query",
+];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))

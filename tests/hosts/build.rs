@@ -3,15 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The C files that hosts share; the last one is ODE's.
-const SHARED_SOURCES: [&str; 6] = [
-    "c/host_cloth.c",
-    "c/host_mesh.c",
-    "c/signorini_host.c",
-    "c/cloth_contact.c",
-    "c/example_run.c",
-    "c/ode_contact.c",
-];
+/// The C files that all hosts share.
+const SHARED_SOURCES: [&str; 4] = ["c/host_cloth.c", "c/host_mesh.c", "c/signorini_host.c", "c/cloth_contact.c"];
 
 /// The engine that a host belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,11 +38,11 @@ impl Engine {
         String::from_utf8_lossy(&output.stdout).split_whitespace().map(str::to_owned).collect()
     }
 
-    /// The example files in C that its hosts share.
-    fn shared_sources(self) -> &'static [&'static str] {
+    /// What runs a scene in this engine.
+    fn scene_sources(self) -> &'static [&'static str] {
         match self {
-            Engine::Bullet => &SHARED_SOURCES[..SHARED_SOURCES.len() - 1],
-            Engine::Ode => &SHARED_SOURCES,
+            Engine::Bullet => &["c/example_run.c", "cpp/bullet_engine.cpp"],
+            Engine::Ode => &["c/example_run.c", "c/ode_engine.c", "c/ode_contact.c"],
         }
     }
 }
@@ -60,6 +53,8 @@ pub struct Program {
     pub main: &'static str,
     /// Engine it links.
     pub engine: Engine,
+    /// Whether `main` is a scene that knows no engine.
+    pub is_scene: bool,
 }
 
 impl Program {
@@ -84,12 +79,13 @@ impl Program {
     fn build(&self) -> PathBuf {
         let library = library_folder();
         let name = Path::new(self.main).file_stem().expect("a file name").to_string_lossy().into_owned();
-        let folder = library.join("hosts").join(&name);
+        let folder = library.join("hosts").join(format!("{:?}_{name}", self.engine).to_lowercase());
         std::fs::create_dir_all(&folder).expect("a folder for objects");
         let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
 
         let mut objects = Vec::new();
-        for source in self.engine.shared_sources().iter().chain([&self.main]) {
+        let of_scene = if self.is_scene { self.engine.scene_sources() } else { &[] };
+        for source in SHARED_SOURCES.iter().chain(of_scene).chain([&self.main]) {
             let source = examples.join(source);
             let object = folder.join(source.file_name().expect("a file name")).with_extension("o");
             let mut compile = compiler(is_cpp(&source));
@@ -107,7 +103,7 @@ impl Program {
         std::os::unix::fs::symlink(library.join("libsignorini.so"), &link_name).expect("a link to the library");
 
         let program = folder.join(&name);
-        let mut link = compiler(is_cpp(&examples.join(self.main)));
+        let mut link = compiler(self.engine == Engine::Bullet);
         link.args(objects).arg("-o").arg(&program);
         link.arg("-L").arg(&library).arg("-lsignorini").arg("-Wl,-rpath,$ORIGIN");
         link.args(self.engine.flags("--libs")).arg("-lm");

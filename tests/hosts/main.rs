@@ -20,28 +20,43 @@ fn runs() -> u32 {
     }
 }
 
+/// Runs a scene, which knows no engine, in this one.
+fn scene(main: &'static str, engine: Engine) {
+    Program { main, engine, is_scene: true }.run(&[&runs().to_string()]);
+}
+
 #[test]
 fn bullet_cloth_catches_box() {
-    Program { main: "cpp/bullet_cloth_catches_box.cpp", engine: Engine::Bullet }.run(&[&runs().to_string()]);
+    scene("c/cloth_catches_box.c", Engine::Bullet);
 }
 
 #[test]
 fn ode_cloth_catches_box() {
-    Program { main: "c/ode_cloth_catches_box.c", engine: Engine::Ode }.run(&[&runs().to_string()]);
+    scene("c/cloth_catches_box.c", Engine::Ode);
 }
 
 #[test]
 fn bullet_sphere_wrapped() {
-    Program { main: "cpp/bullet_sphere_wrapped.cpp", engine: Engine::Bullet }.run(&[&runs().to_string()]);
+    scene("c/sphere_wrapped.c", Engine::Bullet);
+}
+
+#[test]
+fn ode_sphere_wrapped() {
+    scene("c/sphere_wrapped.c", Engine::Ode);
+}
+
+#[test]
+fn bullet_fast_sphere() {
+    scene("c/fast_sphere.c", Engine::Bullet);
 }
 
 #[test]
 fn ode_fast_sphere() {
-    Program { main: "c/ode_fast_sphere.c", engine: Engine::Ode }.run(&[&runs().to_string()]);
+    scene("c/fast_sphere.c", Engine::Ode);
 }
 
 #[test]
 fn bullet_spot_demo() {
     // The first steps of the demo: the mesh is read, thrown and hits the cloth.
-    Program { main: "cpp/bullet_spot_demo.cpp", engine: Engine::Bullet }.run(&["--steps", "40"]);
+    Program { main: "cpp/bullet_spot_demo.cpp", engine: Engine::Bullet, is_scene: false }.run(&["--steps", "40"]);
 }

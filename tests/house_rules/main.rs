@@ -53,6 +53,18 @@ pub fn sources() -> Vec<File> {
     files
 }
 
+/// All program text outside `src`: tests, benches, examples, bindings, scripts.
+fn other_programs() -> Vec<File> {
+    let endings = [".rs", ".c", ".h", ".cpp", ".hpp", ".py", ".sh"];
+    let mut files = Vec::new();
+    for folder in ["tests", "benches", "examples", "bindings", "ci"] {
+        let before = files.len();
+        collect(&top().join(folder), &endings, &mut files);
+        assert!(files.len() > before, "no programs in {folder}");
+    }
+    files
+}
+
 /// All text files of the repository that people write.
 pub fn everything() -> Vec<File> {
     let mut files = Vec::new();
@@ -88,7 +100,7 @@ fn names_stay_in_their_rooms() {
 
 #[test]
 fn files_keep_their_size() {
-    report(sources().iter().filter_map(text::too_long).collect());
+    report(sources().iter().chain(&other_programs()).filter_map(text::too_long).collect());
 }
 
 #[test]

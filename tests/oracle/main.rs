@@ -13,8 +13,9 @@ mod intersection;
 #[path = "../../benches/support/mod.rs"]
 mod problem_files;
 mod proximity;
-mod random;
 mod scenes;
 mod solver;
 mod solver_problems;
 mod solver_traps;
+
+use problem_files::random;

@@ -15,4 +15,6 @@ mod solids;
 mod stress;
 mod stress_cases;
 mod stress_oracle;
+mod stress_parts;
 mod stress_scenes;
+mod stress_world;

@@ -4,7 +4,8 @@
 //! `SIGNORINI_ALL=1` runs more of them.
 
 use super::stress_oracle as oracle;
-use super::stress_scenes::{Scene, scene};
+use super::stress_scenes::scene;
+use super::stress_world::Scene;
 use super::support::clock::thread_seconds;
 use signorini::implicit_contact::{Memory, Scratch, advance};
 use signorini::math::{Vec3, add, is_finite, norm, scale, sub};

@@ -1,6 +1,7 @@
 //! Small scenes made by hand against single sentences of the promise.
 
-use super::stress_scenes::{Drive, Part, Scene, assemble, ball, block, cloth, plane};
+use super::stress_parts::{Drive, Part, ball, block, cloth, plane};
+use super::stress_world::{Scene, assemble};
 use signorini::implicit_contact::{Memory, Scratch, advance};
 use signorini::math::{Vec3, norm};
 use signorini::model::{Drives, HalfSpace, Model, Settings, StartPolicy, State, StepError, StepReport, StepResult};

@@ -53,7 +53,7 @@ static uint64_t hash_through(SgnContext *context, size_t stride, size_t first, i
       memcpy(start + first + step * (size_t)i + (single ? 4u : 8u) * (unsigned)k, single ? (void *)&f : (void *)&d, single ? 4 : 8);
     }
   }
-  desc.positions = view;
+  desc.mesh.vertices = view;
   OK(sgn_deformable_create(world, &desc, &body));
   OK(sgn_body_push(world, body, SGN_SLOT_VELOCITY, &view, 0));
   hash = state_hash(world);

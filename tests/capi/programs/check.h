@@ -65,10 +65,10 @@ static inline void make_cloth(Cloth *cloth, double spacing, double height) {
 static inline SgnDeformableDesc cloth_desc(const Cloth *cloth) {
   SgnDeformableDesc desc;
   OK(sgn_deformable_desc_init(&desc, sizeof desc));
-  desc.positions = sgn_view(SGN_FORMAT_F64X3, cloth->x, VERTICES);
-  desc.triangles = sgn_view(SGN_FORMAT_U32X3, cloth->triangles, TRIANGLES);
+  desc.mesh.vertices = sgn_view(SGN_FORMAT_F64X3, cloth->x, VERTICES);
+  desc.mesh.triangles = sgn_view(SGN_FORMAT_U32X3, cloth->triangles, TRIANGLES);
   desc.masses = sgn_view(SGN_FORMAT_F64, cloth->mass, VERTICES);
-  desc.half_thickness = 0.005;
+  desc.options.half_thickness = 0.005;
   return desc;
 }
 
@@ -80,9 +80,9 @@ static const uint32_t OCTAHEDRON_FACES[8][3] = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4},
 static inline SgnRigidDesc octahedron_desc(double mass, double height) {
   SgnRigidDesc desc;
   OK(sgn_rigid_desc_init(&desc, sizeof desc));
-  desc.vertices = sgn_view(SGN_FORMAT_F64X3, OCTAHEDRON, 6);
-  desc.triangles = sgn_view(SGN_FORMAT_U32X3, OCTAHEDRON_FACES, 8);
-  desc.half_thickness = 0.005;
+  desc.mesh.vertices = sgn_view(SGN_FORMAT_F64X3, OCTAHEDRON, 6);
+  desc.mesh.triangles = sgn_view(SGN_FORMAT_U32X3, OCTAHEDRON_FACES, 8);
+  desc.options.half_thickness = 0.005;
   desc.mass = mass;
   desc.inertia[0] = desc.inertia[4] = desc.inertia[8] = 0.004 * mass;
   desc.position[2] = height;

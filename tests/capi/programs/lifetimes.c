@@ -248,7 +248,7 @@ static void bodies_come_and_go(void) {
   for (int round = 0; round < 3; round++) {
     for (int i = 0; i < 50; i++) {
       SgnRigidDesc ball = octahedron_desc(1, 0.3 * i);
-      ball.user_key = (uint64_t)i;
+      ball.options.user_key = (uint64_t)i;
       OK(sgn_rigid_create(world, &ball, &ids[i]));
       for (int j = 0; j < i; j++) CHECK(ids[i].value != ids[j].value);
     }

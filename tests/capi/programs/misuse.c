@@ -49,7 +49,7 @@ static Fixture fixture(void) {
   ball = octahedron_desc(0.1, 1.0);
   OK(sgn_rigid_create(f.world, &ball, &f.ball));
   OK(sgn_kinematic_desc_init(&script, sizeof script));
-  script.vertices = sgn_view(SGN_FORMAT_F64X3, OCTAHEDRON, 6);
+  script.mesh.vertices = sgn_view(SGN_FORMAT_F64X3, OCTAHEDRON, 6);
   OK(sgn_kinematic_create(f.world, &script, &f.script));
   OK(sgn_half_space_desc_init(&ground, sizeof ground));
   ground.offset = -1;
@@ -244,7 +244,7 @@ static void wrong_ids(void) {
     if (m.value != 0) {
       GIVES(SGN_ERROR_INVALID_ID, sgn_material_set_pair(f.world, f.material, m, 0.5));
       GIVES(SGN_ERROR_INVALID_ID, sgn_body_set_material(f.world, f.cloth, m));
-      ball.material = m;
+      ball.options.material = m;
       GIVES(SGN_ERROR_INVALID_ID, sgn_rigid_create(f.world, &ball, &removed));
     }
   }
@@ -255,7 +255,7 @@ static void wrong_ids(void) {
   GIVES(SGN_ERROR_STALE_ID, sgn_body_destroy(other.world, other.cloth));
   GIVES(SGN_ERROR_STALE_ID, sgn_body_push(other.world, other.cloth, SGN_SLOT_VELOCITY, &view, 0));
   GIVES(SGN_ERROR_STALE_ID, sgn_system_push(other.world, other.system, &blocks));
-  ball.material.value = 0;
+  ball.options.material.value = 0;
   OK(sgn_rigid_create(other.world, &ball, &removed));
   CHECK(removed.value != other.cloth.value);
   GIVES(SGN_ERROR_STALE_ID, sgn_body_info(other.world, other.cloth, &info));
@@ -399,7 +399,7 @@ static void wrong_values(void) {
   rigid = octahedron_desc(1, 2);                            \
   rigid.field = value;                                      \
   GIVES(code, sgn_rigid_create(f.world, &rigid, &body))
-    WRONG_RIGID(half_thickness, bad[i], SGN_ERROR_NON_FINITE_INPUT);
+    WRONG_RIGID(options.half_thickness, bad[i], SGN_ERROR_NON_FINITE_INPUT);
     WRONG_RIGID(mass, bad[i], SGN_ERROR_NON_FINITE_INPUT);
     WRONG_RIGID(inertia[5], bad[i], SGN_ERROR_NON_FINITE_INPUT);
     WRONG_RIGID(position[1], bad[i], SGN_ERROR_NON_FINITE_INPUT);
@@ -418,7 +418,7 @@ static void wrong_values(void) {
   WRONG_RIGID(inertia[1], 1, SGN_ERROR_INVALID_ARGUMENT);
   WRONG_RIGID(inertia[4], -1, SGN_ERROR_INVALID_ARGUMENT);
   WRONG_RIGID(orientation[3], 0, SGN_ERROR_INVALID_ARGUMENT);
-  WRONG_RIGID(flags, 1u << 30, SGN_ERROR_INVALID_ARGUMENT);
+  WRONG_RIGID(options.flags, 1u << 30, SGN_ERROR_INVALID_ARGUMENT);
   GIVES(SGN_ERROR_INVALID_ARGUMENT, sgn_material_set_pair(f.world, f.material, f.material, -0.1));
   OK(sgn_half_space_desc_init(&plane, sizeof plane));
   plane.normal[2] = 0;
@@ -497,7 +497,7 @@ static void wrong_arrays(void) {
     GIVES(SGN_ERROR_NON_FINITE_INPUT, sgn_system_push(f.world, f.system, &block_view));
     blocks[5][2] = 0;
     desc = cloth_desc(&cloth);
-    desc.positions.ptr = x;
+    desc.mesh.vertices.ptr = x;
     GIVES(SGN_ERROR_NON_FINITE_INPUT, sgn_deformable_create(f.world, &desc, &body));
     desc = cloth_desc(&cloth);
     desc.rest_positions = view;
@@ -514,13 +514,13 @@ static void wrong_arrays(void) {
   memcpy(triangles, cloth.triangles, sizeof triangles);
   triangles[9][1] = VERTICES;
   desc = cloth_desc(&cloth);
-  desc.triangles.ptr = triangles;
+  desc.mesh.triangles.ptr = triangles;
   GIVES(SGN_ERROR_BAD_TOPOLOGY, sgn_deformable_create(f.world, &desc, &body));
   error_is(&f, SGN_ERROR_BAD_TOPOLOGY, 0, 9, VERTICES, "(element 9)");
   triangles[9][1] = triangles[9][0];
   GIVES(SGN_ERROR_BAD_TOPOLOGY, sgn_deformable_create(f.world, &desc, &body));
   desc = cloth_desc(&cloth);
-  desc.points = sgn_view(SGN_FORMAT_U64, wide, 2);
+  desc.mesh.points = sgn_view(SGN_FORMAT_U64, wide, 2);
   GIVES(SGN_ERROR_BAD_TOPOLOGY, sgn_deformable_create(f.world, &desc, &body));
   error_is(&f, SGN_ERROR_BAD_TOPOLOGY, 0, 1, (double)wide[1], "points[1]");
   /* Counts. */
@@ -528,7 +528,7 @@ static void wrong_arrays(void) {
   desc.masses.count--;
   GIVES(SGN_ERROR_BUFFER_LAYOUT, sgn_deformable_create(f.world, &desc, &body));
   desc = cloth_desc(&cloth);
-  desc.positions.count = 0;
+  desc.mesh.vertices.count = 0;
   GIVES(SGN_ERROR_BUFFER_LAYOUT, sgn_deformable_create(f.world, &desc, &body));
   view.ptr = cloth.x;
   view.count--;

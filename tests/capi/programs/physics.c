@@ -27,20 +27,20 @@ static void open_scene(Scene *scene, SgnPrecision precision, int with_ball) {
   OK(sgn_material_create(scene->world, &rough, &material));
   cloth = cloth_desc(&scene->host);
   cloth.precision = precision;
-  cloth.material = material;
+  cloth.options.material = material;
   OK(sgn_deformable_create(scene->world, &cloth, &scene->cloth));
   OK(sgn_half_space_desc_init(&ground, sizeof ground));
-  ground.material = material;
+  ground.options.material = material;
   OK(sgn_half_space_create(scene->world, &ground, &scene->ground));
   if (with_ball) {
     OK(sgn_shape_desc_init(&shape, sizeof shape));
     shape.kind = SGN_SHAPE_BOX;
     shape.half_extents[0] = shape.half_extents[1] = 0.1, shape.half_extents[2] = 0.05;
-    memset(&ball.vertices, 0, sizeof ball.vertices);
-    memset(&ball.triangles, 0, sizeof ball.triangles);
+    memset(&ball.mesh.vertices, 0, sizeof ball.mesh.vertices);
+    memset(&ball.mesh.triangles, 0, sizeof ball.mesh.triangles);
     ball.shape = &shape;
     ball.precision = precision;
-    ball.material = material;
+    ball.options.material = material;
     OK(sgn_rigid_create(scene->world, &ball, &scene->ball));
   }
   OK(sgn_step_desc_init(&scene->step, sizeof scene->step));
@@ -232,7 +232,7 @@ static void pinched(void) {
   shape.half_extents[0] = shape.half_extents[1] = 0.4, shape.half_extents[2] = 0.05;
   OK(sgn_kinematic_desc_init(&jaw, sizeof jaw));
   jaw.shape = &shape;
-  jaw.half_thickness = 0.005;
+  jaw.options.half_thickness = 0.005;
   for (int i = 0; i < 2; i++) {
     jaw.position[2] = 0.0625 + (i ? 0.12 : -0.12);
     OK(sgn_kinematic_create(s.world, &jaw, &jaws[i]));

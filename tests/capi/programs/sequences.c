@@ -79,14 +79,14 @@ static void one_world(int calls) {
       case 0: {
         SgnDeformableDesc desc;
         OK(sgn_deformable_desc_init(&desc, sizeof desc));
-        desc.positions = sgn_view(SGN_FORMAT_F64X3, n.x, vertices);
+        desc.mesh.vertices = sgn_view(SGN_FORMAT_F64X3, n.x, vertices);
         desc.masses = sgn_view(SGN_FORMAT_F64, n.scalars, vertices);
-        if (below(2)) desc.triangles = sgn_view(SGN_FORMAT_U32X3, n.triangles, below(5));
-        if (below(2)) desc.edges = sgn_view(SGN_FORMAT_U32X2, n.edges, below(5));
+        if (below(2)) desc.mesh.triangles = sgn_view(SGN_FORMAT_U32X3, n.triangles, below(5));
+        if (below(2)) desc.mesh.edges = sgn_view(SGN_FORMAT_U32X2, n.edges, below(5));
         if (below(2)) desc.pinned = sgn_view(SGN_FORMAT_U8, n.flags, vertices);
-        if (below(2)) desc.half_thickness = clean ? 0.001 : number();
+        if (below(2)) desc.options.half_thickness = clean ? 0.001 : number();
         desc.precision = (int32_t)below(2);
-        desc.material = material;
+        desc.options.material = material;
         result = sgn_deformable_create(world, &desc, slot);
         break;
       }
@@ -100,9 +100,9 @@ static void one_world(int calls) {
       case 2: {
         SgnKinematicDesc desc;
         OK(sgn_kinematic_desc_init(&desc, sizeof desc));
-        desc.vertices = sgn_view(SGN_FORMAT_F64X3, n.x, vertices);
-        desc.triangles = sgn_view(SGN_FORMAT_U32X3, n.triangles, below(4));
-        desc.flags = below(2) ? SGN_BODY_POSED : 0;
+        desc.mesh.vertices = sgn_view(SGN_FORMAT_F64X3, n.x, vertices);
+        desc.mesh.triangles = sgn_view(SGN_FORMAT_U32X3, n.triangles, below(4));
+        desc.options.flags = below(2) ? SGN_BODY_POSED : 0;
         result = sgn_kinematic_create(world, &desc, slot);
         break;
       }

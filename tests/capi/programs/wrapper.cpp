@@ -37,8 +37,8 @@ static void hammock() {
 
   auto cloth = signorini::make<SgnDeformableDesc>();
   cloth.precision = SGN_PRECISION_F32;
-  cloth.positions = signorini::view(x);
-  cloth.triangles = signorini::view(triangles);
+  cloth.mesh.vertices = signorini::view(x);
+  cloth.mesh.triangles = signorini::view(triangles);
   cloth.masses = signorini::view(mass);
   cloth.pinned = signorini::view(pinned);
   SgnBodyId cloth_id{}, box_id{};
@@ -50,7 +50,7 @@ static void hammock() {
   auto box = signorini::make<SgnRigidDesc>();
   box.shape = &shape;
   box.mass = 0.1;
-  box.half_thickness = 0.005;
+  box.options.half_thickness = 0.005;
   box.position[0] = box.position[1] = 0.4;
   box.position[2] = 0.2;
   CHECK(world.add(box, box_id) == SGN_OK);
