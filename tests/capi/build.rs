@@ -7,19 +7,29 @@ use std::process::{Command, Output};
 #[derive(Clone, Copy)]
 pub enum Standard {
     C99,
+    /// With the address and the undefined behaviour sanitizer, which end the program at what they find.
+    C99Sanitized,
     C11,
     Cxx11,
     Cxx17,
 }
 
 impl Standard {
-    fn is_cpp(self) -> bool {
+    pub fn is_cpp(self) -> bool {
         matches!(self, Standard::Cxx11 | Standard::Cxx17)
+    }
+
+    /// Flags of the compiler and the linker.
+    fn sanitizers(self) -> &'static [&'static str] {
+        match self {
+            Standard::C99Sanitized => &["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined"],
+            _ => &[],
+        }
     }
 
     fn flag(self) -> &'static str {
         match self {
-            Standard::C99 => "-std=c99",
+            Standard::C99 | Standard::C99Sanitized => "-std=c99",
             Standard::C11 => "-std=c11",
             Standard::Cxx11 => "-std=c++11",
             Standard::Cxx17 => "-std=c++17",
@@ -48,7 +58,7 @@ pub fn compiler(standard: Standard) -> Command {
         build.flag(flag);
     }
     let mut command = build.get_compiler().to_command();
-    command.arg("-I").arg(root().join("include"));
+    command.args(standard.sanitizers()).arg("-I").arg(root().join("include"));
     command
 }
 
@@ -69,7 +79,10 @@ pub fn build(source: &str, standard: Standard) -> PathBuf {
     let folder = library.join("capi");
     std::fs::create_dir_all(&folder).expect("a folder for programs");
     let stem = Path::new(source).file_stem().expect("a file name").to_string_lossy().into_owned();
-    let program = folder.join(format!("{stem}{}", standard.flag().replace('=', "_")));
+    let program = folder.join(format!(
+        "{stem}{}",
+        standard.flag().replace('=', "_") + if standard.sanitizers().is_empty() { "" } else { "_sanitized" }
+    ));
     let mut command = compiler(standard);
     command.arg("-I").arg(root().join("bindings/cpp"));
     command.arg(root().join(source)).arg("-o").arg(&program);

@@ -8,7 +8,7 @@ fn the_header_compiles_alone() {
     for standard in [Standard::C99, Standard::C11, Standard::Cxx11, Standard::Cxx17] {
         let mut command = compiler(standard);
         command.args(["-fsyntax-only", "-Wconversion", "-Wshadow", "-Wcast-qual"]);
-        command.args(["-x", if matches!(standard, Standard::C99 | Standard::C11) { "c" } else { "c++" }]);
+        command.args(["-x", if standard.is_cpp() { "c++" } else { "c" }]);
         command.arg(root().join("tests/capi/programs/header_alone.c"));
         succeed(command);
     }
@@ -54,7 +54,7 @@ fn physics_through_the_c_abi() {
 /// Random calls; SIGNORINI_ALL=1 tries more of them.
 #[test]
 fn random_calls_give_statuses_and_refusals_change_nothing() {
-    let worlds = if std::env::var_os("SIGNORINI_ALL").is_some() { "2000" } else { "60" };
+    let worlds = if all() { "2000" } else { "60" };
     let text = run("tests/capi/programs/sequences.c", Standard::C99, &[worlds, "1"]);
     assert!(text.lines().any(|line| line == "PASS"), "{text}");
 }
@@ -71,14 +71,33 @@ fn a_host_loads_the_library_and_its_table() {
     assert_eq!(text, "PASS\n");
 }
 
-/// The programs that try everything once, under valgrind: no bad access, nothing lost. Slow, so only with SIGNORINI_ALL=1.
+/// Programs that try every call and every layout of memory, with their arguments.
+const MEMORY_PROGRAMS: [(&str, &[&str]); 3] = [("misuse.c", &[]), ("buffers.c", &[]), ("sequences.c", &["20", "3"])];
+/// Programs that run long as well, under the sanitizers with SIGNORINI_ALL=1.
+const LONG_PROGRAMS: [(&str, &[&str]); 3] = [("physics.c", &[]), ("lifetimes.c", &[]), ("sequences.c", &["300", "4"])];
+
+fn all() -> bool {
+    std::env::var_os("SIGNORINI_ALL").is_some()
+}
+
+/// No bad access to the host's memory, no undefined behaviour in the host, nothing lost.
+#[test]
+fn sanitizers_find_nothing() {
+    let long: &[_] = if all() { &LONG_PROGRAMS } else { &[] };
+    for (source, arguments) in MEMORY_PROGRAMS.iter().chain(long) {
+        let text = run(&format!("tests/capi/programs/{source}"), Standard::C99Sanitized, arguments);
+        assert!(text.lines().any(|line| line == "PASS"), "{source}:\n{text}");
+    }
+}
+
+/// The same under valgrind, which sees the library's own accesses too. Slow, so only with SIGNORINI_ALL=1.
 #[test]
 fn valgrind_finds_nothing() {
-    if std::env::var_os("SIGNORINI_ALL").is_none() {
+    if !all() {
         println!("skipped without SIGNORINI_ALL=1");
         return;
     }
-    for source in ["misuse.c", "buffers.c"] {
+    for (source, arguments) in MEMORY_PROGRAMS {
         let program = build(&format!("tests/capi/programs/{source}"), Standard::C99);
         let mut command = Command::new("valgrind");
         command.args([
@@ -88,7 +107,7 @@ fn valgrind_finds_nothing() {
             "--show-leak-kinds=definite",
             "--errors-for-leak-kinds=definite",
         ]);
-        command.arg(program).env_remove("LD_LIBRARY_PATH");
+        command.arg(program).args(arguments).env_remove("LD_LIBRARY_PATH");
         let output = succeed(command);
         assert!(String::from_utf8_lossy(&output.stdout).contains("PASS"), "{source}");
     }

@@ -306,8 +306,47 @@ static void rebuilds_change_nothing(void) {
   CHECK(hashes[0] == hashes[1]);
 }
 
+/* Height at which a body comes to rest on the ground, all masses times `size`. */
+static double rest_height(double size) {
+  SgnContext *context;
+  SgnWorld *world;
+  SgnBodyId ball, ground;
+  SgnRigidDesc desc = octahedron_desc(size, 0.15);
+  SgnHalfSpaceDesc plane;
+  SgnStepDesc step;
+  double v[3] = {0}, pose[7] = {0};
+  SgnView push = sgn_view(SGN_FORMAT_F64X3, v, 1);
+  SgnViewMut pull = sgn_view_mut(SGN_FORMAT_F64X3, v, 1), pull_pose = sgn_view_mut(SGN_FORMAT_F64X7, pose, 1);
+  OK(sgn_context_create(SGN_ABI_VERSION, NULL, NULL, 0, &context));
+  OK(sgn_world_create(context, NULL, &world));
+  OK(sgn_half_space_desc_init(&plane, sizeof plane));
+  OK(sgn_half_space_create(world, &plane, &ground));
+  OK(sgn_rigid_create(world, &desc, &ball));
+  OK(sgn_step_desc_init(&step, sizeof step));
+  step.dt = DT;
+  for (int i = 0; i < 30; i++) {
+    v[2] -= DT * G;
+    OK(sgn_body_push(world, ball, SGN_SLOT_VELOCITY, &push, 0));
+    CHECK(sgn_world_step(world, &step, NULL) >= 0);
+    OK(sgn_body_pull(world, ball, SGN_SLOT_END_VELOCITY, &pull));
+  }
+  OK(sgn_body_pull(world, ball, SGN_SLOT_POSE, &pull_pose));
+  OK(sgn_world_destroy(world));
+  OK(sgn_context_destroy(context));
+  return pose[2];
+}
+
+/* A body falls alike whatever its mass and inertia, also where products of them are no doubles any more. */
+static void masses_of_any_size(void) {
+  static const double sizes[] = {1e-290, 1e-200, 1e-120, 1e120, 1e200, 1e290};
+  double height = rest_height(1.0);
+  CHECK(height > 0.1 && height < 0.11);
+  for (int i = 0; i < 6; i++) CHECK(fabs(rest_height(sizes[i]) - height) < 1e-4);
+}
+
 int main(void) {
   rest();
+  masses_of_any_size();
   floats_are_certified();
   pushes_between_steps();
   pinched();
