@@ -11,6 +11,7 @@
 //! | [`geometry`] | closest points of primitive pairs, bounding volumes |
 //! | [`linalg`] | 3x3 block-sparse matrices, relaxation, conjugate gradients |
 //! | [`mesh`] | triangle meshes, shapes, validation |
+//! | [`energy`] | springs, membranes, shells, solids: energies with their forces and Hessians |
 //! | [`detection`] | broad phase, proximity, continuous detection, intersection certificate |
 //! | [`kinematics`] | poses and the map from degrees of freedom to vertices |
 //! | [`model`] | model, state, settings, reports |
@@ -28,6 +29,7 @@ pub mod capi;
 pub mod constraint;
 pub mod contact_search;
 pub mod detection;
+pub mod energy;
 pub mod fail_safe;
 pub mod geometry;
 pub mod implicit_contact;

@@ -142,6 +142,12 @@ pub fn mat_add(a: &Mat3, b: &Mat3) -> Mat3 {
     [add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])]
 }
 
+/// `a b^T`
+#[inline(always)]
+pub fn outer(a: Vec3, b: Vec3) -> Mat3 {
+    [scale(a[0], b), scale(a[1], b), scale(a[2], b)]
+}
+
 /// `s m`
 #[inline(always)]
 pub fn mat_scale(s: f64, m: &Mat3) -> Mat3 {

@@ -1,0 +1,96 @@
+//! Which blocks of a body's matrix its energies fill.
+
+use super::{Elements, Forces, Stencil};
+
+/// Places of a stencil's blocks among the values of the matrix.
+pub type Places<const N: usize> = [[u32; N]; N];
+
+/// Block pattern of a body over its nodes, full rows, columns ascending, diagonal present; and where every energy adds.
+/// Depends on the topology alone: made once.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pattern {
+    /// Start of each block row in `columns`; one more entry than nodes.
+    pub row_offsets: Vec<usize>,
+    /// Block columns.
+    pub columns: Vec<u32>,
+    /// Place of each diagonal block.
+    pub diagonal: Vec<u32>,
+    /// Places of the springs' blocks.
+    pub springs: Vec<Places<2>>,
+    /// Places of the membranes' blocks.
+    pub membranes: Vec<Places<3>>,
+    /// Places of the hinges' blocks.
+    pub hinges: Vec<Places<4>>,
+    /// Places of the solids' blocks.
+    pub tetrahedra: Vec<Places<4>>,
+    /// Places of the blocks of faces in the wind.
+    pub drag: Vec<Places<3>>,
+}
+
+impl Pattern {
+    /// The pattern of `forces` over `count` nodes. Node numbers in range ([`Forces::fault`]). Cost: a sort of the pairs.
+    pub fn new(forces: &Forces, count: usize) -> Pattern {
+        let mut pairs: Vec<(u32, u32)> = (0..count as u32).map(|i| (i, i)).collect();
+        add_pairs(&forces.springs.nodes, &mut pairs);
+        add_pairs(&forces.membranes.nodes, &mut pairs);
+        add_pairs(&forces.hinges.nodes, &mut pairs);
+        add_pairs(&forces.tetrahedra.nodes, &mut pairs);
+        add_pairs(&forces.drag_faces, &mut pairs);
+        pairs.sort_unstable();
+        pairs.dedup();
+        let mut row_offsets = vec![0; count + 1];
+        pairs.iter().for_each(|p| row_offsets[p.0 as usize + 1] += 1);
+        for i in 0..count {
+            row_offsets[i + 1] += row_offsets[i];
+        }
+        let columns: Vec<u32> = pairs.iter().map(|p| p.1).collect();
+        let mut pattern = Pattern { row_offsets, columns, ..Pattern::default() };
+        pattern.diagonal = (0..count as u32).map(|i| pattern.place(i, i)).collect();
+        pattern.springs = pattern.places(&forces.springs);
+        pattern.membranes = pattern.places(&forces.membranes);
+        pattern.hinges = pattern.places(&forces.hinges);
+        pattern.tetrahedra = pattern.places(&forces.tetrahedra);
+        pattern.drag = forces.drag_faces.iter().map(|nodes| pattern.places_of(nodes)).collect();
+        pattern
+    }
+
+    fn place(&self, row: u32, column: u32) -> u32 {
+        let slots = self.row_offsets[row as usize]..self.row_offsets[row as usize + 1];
+        let within = self.columns[slots.clone()].partition_point(|c| *c < column);
+        (slots.start + within) as u32
+    }
+
+    fn places_of<const N: usize>(&self, nodes: &[u32; N]) -> Places<N> {
+        nodes.map(|row| nodes.map(|column| self.place(row, column)))
+    }
+
+    fn places<S: Stencil<N>, const N: usize>(&self, elements: &Elements<S, N>) -> Vec<Places<N>> {
+        elements.nodes.iter().map(|nodes| self.places_of(nodes)).collect()
+    }
+}
+
+fn add_pairs<const N: usize>(stencils: &[[u32; N]], pairs: &mut Vec<(u32, u32)>) {
+    for nodes in stencils {
+        for a in nodes {
+            pairs.extend(nodes.iter().filter(|b| *b != a).map(|b| (*a, *b)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::energy::Spring;
+
+    #[test]
+    fn rows_are_sorted_hold_the_diagonal_and_places_agree() {
+        let mut forces = Forces { drag_faces: vec![[3, 1, 0]], ..Forces::default() };
+        forces.springs.push([2, 0], Spring { stiffness: 1.0, rest_length: 1.0 });
+        let pattern = Pattern::new(&forces, 5);
+        assert_eq!(pattern.row_offsets, [0, 4, 7, 9, 12, 13]);
+        assert_eq!(pattern.columns, [0, 1, 2, 3, 0, 1, 3, 0, 2, 0, 1, 3, 4]);
+        assert_eq!(pattern.diagonal, [0, 5, 8, 11, 12]);
+        assert_eq!(pattern.springs, [[[8, 7], [2, 0]]]);
+        assert_eq!(pattern.drag[0][0], [11, 10, 9]);
+    }
+}
