@@ -4,6 +4,6 @@
 mod checks;
 mod configurations;
 #[allow(dead_code)]
-#[path = "../oracle/random.rs"]
+#[path = "../../benches/support/random.rs"]
 mod random;
 mod stencils;
