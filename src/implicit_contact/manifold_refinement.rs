@@ -116,7 +116,9 @@ pub(super) fn refine(
     let mut tolerance_factor = 1.0;
     let mut tightened = false;
     let mut clean: Option<Refined> = None;
-    for _ in 0..settings.rounds_max.max(1) {
+    let mut rounds_left = settings.rounds_max.max(1);
+    while rounds_left > 0 {
+        rounds_left -= 1;
         account.rounds += 1;
         let converged = solve_round(
             around,
@@ -138,7 +140,9 @@ pub(super) fn refine(
         unrounded_end(segment, &refined, &mut linear_end);
         let end = &linear_end.positions;
         if !converged && refined.set.recovers() {
-            // Nothing but recovery can ask for what has no solution: it is the first thing to go.
+            // Nothing but recovery can ask for what has no solution: it is the first thing to go. What is left is
+            // solved once at least, in a round more than the cap if need be.
+            rounds_left = rounds_left.max(1);
             settings.recovery_fraction = 0.0;
             clean = refined.hits.is_empty().then(|| refined.clone()).or(clean);
             refined.set.drop_recovery();

@@ -59,6 +59,16 @@ fn random_calls_give_statuses_and_refusals_change_nothing() {
     assert!(text.lines().any(|line| line == "PASS"), "{text}");
 }
 
+/// Worlds that once were refused by every call (an inertia too small), and that panicked (recovery dropped in the last
+/// round).
+#[test]
+fn random_calls_that_once_failed() {
+    for [seed, first] in [["1", "153"], ["7", "1370"]] {
+        let text = run("tests/capi/programs/sequences.c", Standard::C99, &["1", seed, first]);
+        assert!(text.lines().any(|line| line == "PASS"), "{text}");
+    }
+}
+
 #[test]
 fn the_cpp_wrapper_drives_a_hammock() {
     passes("wrapper.cpp", Standard::Cxx17);

@@ -413,3 +413,24 @@ fn a_sticking_block_does_not_creep() {
     assert!(moved < 5e-3, "crept by {moved}");
     assert!(speed < 0.1 * 9.81 * 0.01, "moves at {speed}");
 }
+
+/// Recovery of lost thickness is dropped where a solve does not converge, in the last round as in any other.
+#[test]
+fn recovery_is_dropped_in_the_last_round_too() {
+    for rounds_max in [0, 1, 2, 5] {
+        let settings = Settings { iterations_max: 0, rounds_max, ..settings() };
+        let mut parts = vec![triangle(0.0), triangle(0.3)];
+        parts[1].pose.orientation = [0.0, 0.0, 0.38, 0.924_986_5];
+        parts.iter_mut().for_each(|p| p.half_thickness = 0.3);
+        let scene = scene_of(parts, settings, 0.1);
+        let mut world = World::new(&scene);
+        let mut drives = scene.model.idle_drives(&scene.state);
+        drives.velocities[3..].fill([0.0, 0.0, -7.0]);
+        let report = world.step(&scene.model, &drives, &settings, 0.1).unwrap();
+        assert_eq!(report.intersections, Some(0), "{rounds_max} rounds");
+        assert!(all_finite(&world.state, &world.result));
+        let lowest = world.state.positions[3..].iter().fold(f64::INFINITY, |m, x| m.min(x[2]));
+        let highest = world.state.positions[..3].iter().fold(f64::NEG_INFINITY, |m, x| m.max(x[2]));
+        assert!(lowest > highest, "{rounds_max} rounds: passed through, {lowest} {highest}");
+    }
+}

@@ -1,5 +1,5 @@
 /* Random calls with random arguments, good and bad: statuses only, and what is refused leaves the world as it was.
- * Arguments: number of worlds, seed. */
+ * Arguments: number of worlds, seed, first world. */
 #include "check.h"
 
 static uint64_t random_state;
@@ -206,7 +206,8 @@ static void one_world(int calls) {
 int main(int count, char **arguments) {
   int worlds = count > 1 ? atoi(arguments[1]) : 60;
   uint64_t seed = count > 2 ? strtoull(arguments[2], NULL, 10) : 1;
-  for (int i = 0; i < worlds && failures == 0; i++) {
+  int first = count > 3 ? atoi(arguments[3]) : 0;
+  for (int i = first; i < first + worlds && failures == 0; i++) {
     random_state = (seed * 1000003u + (uint64_t)i + 1) * 0x9e3779b97f4a7c15u;
     one_world(120);
     if (failures) printf("world %d of seed %llu\n", i, (unsigned long long)seed);
