@@ -6,17 +6,18 @@
 
 use super::bvh::{Bvh, Frame, LEAF, MIXED, PackedBox};
 use super::leaf_blocks::{Block, LeafBlocks};
-use super::ownership::{Lists, Ownership, own};
-use super::pair_lists::{PairLists, merge};
+use super::leaf_pairs::Side;
+use super::ownership::{Ownership, own};
+use super::pair_lists::{PairBuffer, PairLists, merge};
 use super::primitives::{Candidates, Filter, Motion, Primitives};
 use crate::geometry::Aabb;
-use crate::math::{Vec3, lerp};
+use crate::math::Vec3;
+use crate::math::simd::{Eight, EightKernel, run_eight};
 use crate::parallel::Par;
+use std::ops::Range;
 
 /// Leaves per task of a parallel traversal.
 const TASK: usize = 64;
-/// Blocks of four vertices, edges or faces of one leaf at most: three primitives an element.
-const BLOCKS: usize = (3 * LEAF).div_ceil(4);
 /// The tree is rebuilt when its branches have grown this much against the boxes of its leaves.
 const DECAY: f64 = 1.5;
 
@@ -77,48 +78,43 @@ impl BroadPhase {
         let motion = Motion { x0, x1, radius };
         self.boxes.resize(x0.len(), Aabb::EMPTY);
         par.map_into(&mut self.boxes, |v| motion.vertex_box(v as u32));
-        // Blocks as in `Par::sum`; a union does not depend on the order.
+        // A union does not depend on the order.
         let bounds = self.boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b));
         let frame = Frame::of(&bounds);
         self.packed.resize(x0.len(), PackedBox::EMPTY);
         let boxes = &self.boxes;
         par.map_into(&mut self.packed, |v| frame.packed(&boxes[v]));
         if !self.built {
-            self.rebuild(&motion);
+            self.arrange();
         }
         let quality = self.fit(par);
         if self.quality == 0.0 {
             self.quality = quality;
         } else if quality > DECAY * self.quality {
-            self.rebuild(&motion);
+            self.arrange();
             self.quality = self.fit(par);
         }
     }
 
-    /// Orders the elements anew about the middle of their motion.
-    fn rebuild(&mut self, motion: &Motion) {
-        let middle = |v: u32| lerp(motion.x0[v as usize], motion.x1[v as usize], 0.5);
-        let centre = |corners: &[u32]| {
-            // Half the sum of the first and the last corner: any point of the element serves.
-            lerp(middle(corners[0]), middle(corners[corners.len() - 1]), 0.5)
+    /// [`BroadPhase::refit`] with a tree built anew.
+    pub fn rebuild(&mut self, x0: &[Vec3], x1: &[Vec3], radius: &[f64], par: Par) {
+        (self.built, self.quality) = (false, 0.0);
+        self.refit(x0, x1, radius, par);
+    }
+
+    /// Orders the elements anew by their boxes.
+    fn arrange(&mut self) {
+        let (edges, faces, packed, owned) = (&self.edges, &self.faces, &self.packed, &self.ownership);
+        let bounds = |corners: &[u32]| {
+            corners[1..].iter().fold(packed[corners[0] as usize], |b, v| b.union(&packed[*v as usize]))
         };
-        let (edges, faces) = (&self.edges, &self.faces);
-        let owned = &self.ownership;
-        let mut centres: Vec<Vec3> = Vec::with_capacity(owned.elements());
-        centres.extend(faces.iter().map(|f| centre(f)));
-        centres.extend(owned.loose_edges.iter().map(|e| centre(&edges[*e as usize])));
-        centres.extend(owned.loose_vertices.iter().map(|v| centre(&[*v])));
-        let (tree, order) = Bvh::build(&centres, &owned.components);
-        let gather = |lists: &Lists| -> Vec<Vec<u32>> {
-            let of = |leaf: &[u32]| leaf.iter().flat_map(|e| lists.of(*e)).copied().collect();
-            order.chunks(LEAF).map(of).collect()
-        };
-        self.leaf_vertices = LeafBlocks::arrange(gather(&owned.vertices).iter().map(Vec::as_slice), |v| [v]);
-        let edges_of = gather(&owned.edges);
-        self.leaf_edges = LeafBlocks::arrange(edges_of.iter().map(Vec::as_slice), |e| edges[e as usize]);
-        let is_face = |e: &u32| (*e as usize) < faces.len();
-        let faces_of: Vec<Vec<u32>> = order.chunks(LEAF).map(|l| l.iter().copied().filter(is_face).collect()).collect();
-        self.leaf_faces = LeafBlocks::arrange(faces_of.iter().map(Vec::as_slice), |f| faces[f as usize]);
+        let of_faces = faces.iter().map(|f| bounds(f));
+        let of_edges = owned.loose_edges.iter().map(|e| bounds(&edges[*e as usize]));
+        let of_vertices = owned.loose_vertices.iter().map(|v| packed[*v as usize]);
+        let (tree, order) = Bvh::build(of_faces.chain(of_edges).chain(of_vertices), &owned.components);
+        self.leaf_vertices.arrange(order.chunks(LEAF), &owned.vertices, |v| [v]);
+        self.leaf_edges.arrange(order.chunks(LEAF), &owned.edges, |e| edges[e as usize]);
+        self.leaf_faces.arrange(order.chunks(LEAF), &owned.faces, |f| faces[f as usize]);
         self.tree = tree;
         self.built = true;
     }
@@ -161,140 +157,89 @@ impl BroadPhase {
 
     fn traverse(&self, wanted: Wanted, filter: &Filter, par: Par) -> [PairLists; 2] {
         let count = self.leaves.len();
-        let mut tasks: Vec<(usize, Found)> = (0..count).step_by(TASK).map(|i| (i, Found::default())).collect();
-        par.for_each_task(&mut tasks, |(start, found)| {
-            for leaf in *start..count.min(*start + TASK) {
-                self.leaf(leaf as u32, wanted, filter, found);
-            }
-        });
-        let (mut first, mut second) = (Vec::with_capacity(tasks.len()), Vec::with_capacity(tasks.len()));
-        for (_, found) in tasks {
-            first.push(found.first);
-            second.push(found.second);
-        }
-        [first, second]
-    }
-
-    /// All pairs of one leaf with itself and the leaves behind it.
-    fn leaf(&self, a: u32, wanted: Wanted, filter: &Filter, found: &mut Found) {
-        let own = self.tree.components[a as usize];
-        let passes =
-            |other: u32| own == MIXED || other == MIXED || filter(self.representative(own), self.representative(other));
-        self.tree.visit(&self.leaves[a as usize].query(), a, passes, |b| {
-            // Within one component on each side the filter has been asked already.
-            let mixed = own == MIXED || self.tree.components[b as usize] == MIXED;
-            let pass = |v: u32, w: u32| !mixed || filter(v, w);
-            match wanted {
-                Wanted::Contacts => self.contacts(a, b, &pass, found),
-                Wanted::EdgeFace => self.edge_faces(a, b, &pass, found),
-            }
-        });
-    }
-
-    fn contacts(&self, a: u32, b: u32, pass: &impl Fn(u32, u32) -> bool, found: &mut Found) {
-        let (box_a, box_b) = (self.leaves[a as usize].query(), self.leaves[b as usize].query());
-        let (vertices, edges, faces) = (&self.leaf_vertices, &self.leaf_edges, &self.leaf_faces);
-        let mut side = Side { boxes: &self.boxes, pass, out: &mut found.first };
-        side.pairs(vertices.leaf(a), &box_b, faces.leaf(b), &box_a, false);
-        if a != b {
-            side.pairs(vertices.leaf(b), &box_a, faces.leaf(a), &box_b, false);
-        }
-        side.out = &mut found.second;
-        side.pairs(edges.leaf(a), &box_b, edges.leaf(b), &box_a, a == b);
-    }
-
-    fn edge_faces(&self, a: u32, b: u32, pass: &impl Fn(u32, u32) -> bool, found: &mut Found) {
-        let (box_a, box_b) = (self.leaves[a as usize].query(), self.leaves[b as usize].query());
-        let (edges, faces) = (&self.leaf_edges, &self.leaf_faces);
-        let mut side = Side { boxes: &self.boxes, pass, out: &mut found.first };
-        side.pairs(edges.leaf(a), &box_b, faces.leaf(b), &box_a, false);
-        if a != b {
-            side.pairs(edges.leaf(b), &box_a, faces.leaf(a), &box_b, false);
-        }
+        let task = |start: usize| Task { tree: self, wanted, filter, leaves: start..count.min(start + TASK) };
+        let mut tasks: Vec<_> = (0..count).step_by(TASK).map(|i| (task(i), Found::default())).collect();
+        par.for_each_task(&mut tasks, |(task, found)| *found = run_eight(task.clone()));
+        tasks.into_iter().map(|(_, found)| found).unzip().into()
     }
 }
 
-/// Pairs between two leaves, and where they go.
-struct Side<'a, P> {
-    /// Boxes in double precision by vertex index, for ties.
-    boxes: &'a [Aabb],
-    pass: &'a P,
-    out: &'a mut Vec<[u32; 2]>,
-}
-
-impl<P: Fn(u32, u32) -> bool> Side<'_, P> {
-    /// All pairs of primitives of one leaf with those of another, each first restricted to the other's box. Of a list
-    /// with itself (`same`), each pair once.
-    #[inline(always)]
-    fn pairs<const N: usize, const M: usize>(
-        &mut self,
-        first: &[Block<N>],
-        near_first: &[f32; 6],
-        second: &[Block<M>],
-        near_second: &[f32; 6],
-        same: bool,
-    ) {
-        let mut masks = [0; BLOCKS];
-        let mut any = 0;
-        for (mask, block) in masks.iter_mut().zip(second) {
-            *mask = block.near(near_second);
-            any |= *mask;
-        }
-        if any == 0 {
-            return;
-        }
-        for (i, block) in first.iter().enumerate() {
-            let mut lanes = block.near(near_first);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let (query, corners) = (block.query(lane), block.corners(lane));
-                for (j, other) in second.iter().enumerate().skip(if same { i } else { 0 }) {
-                    // Of its own block, only the lanes behind it.
-                    let behind = if same && i == j { !((2 << lane) - 1) } else { -1 };
-                    let hits = other.near(&query) & masks[j] & behind;
-                    if hits != 0 {
-                        self.found(block.number(lane), &corners, &query, other, hits);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Keeps the hits that share no vertex, overlap exactly and pass the filter.
-    #[inline(always)]
-    fn found<const N: usize, const M: usize>(
-        &mut self,
-        number: u32,
-        corners: &[u32; N],
-        query: &[f32; 6],
-        other: &Block<M>,
-        hits: i32,
-    ) {
-        let mut hits = hits & !other.sharing(corners);
-        let proven = other.proven(query);
-        while hits != 0 {
-            let lane = hits.trailing_zeros() as usize;
-            hits &= hits - 1;
-            let other_corners = other.corners(lane);
-            let overlap = proven >> lane & 1 == 1 || self.exact_box(corners).overlaps(&self.exact_box(&other_corners));
-            if overlap && (self.pass)(corners[0], other_corners[0]) {
-                let n = other.number(lane);
-                // Edge-edge: the smaller first. The other kinds have their fixed order.
-                self.out.push(if N == M && n < number { [n, number] } else { [number, n] });
-            }
-        }
-    }
-
-    #[cold]
-    fn exact_box<const N: usize>(&self, corners: &[u32; N]) -> Aabb {
-        corners.iter().fold(Aabb::EMPTY, |b, v| b.union(&self.boxes[*v as usize]))
-    }
+/// The leaves of one task.
+#[derive(Clone)]
+struct Task<'a> {
+    tree: &'a BroadPhase,
+    wanted: Wanted,
+    filter: &'a Filter<'a>,
+    leaves: Range<usize>,
 }
 
 /// Pairs found by one task.
-#[derive(Default)]
-struct Found {
-    first: Vec<[u32; 2]>,
-    second: Vec<[u32; 2]>,
+type Found = (PairBuffer, PairBuffer);
+
+impl EightKernel for Task<'_> {
+    type Output = Found;
+
+    #[inline(always)]
+    fn run<E: Eight>(self, eight: E) -> Found {
+        let mut found = Found::default();
+        let mut near = Vec::new();
+        for a in self.leaves.start as u32..self.leaves.end as u32 {
+            self.list(eight, a, &mut near);
+            for b in &near {
+                match self.wanted {
+                    Wanted::Contacts => self.contacts(eight, a, *b, &mut found),
+                    Wanted::EdgeFace => self.edge_faces(eight, a, *b, &mut found),
+                }
+            }
+        }
+        found
+    }
+}
+
+impl Task<'_> {
+    /// A leaf, and those behind it, whose boxes overlap its own and which the filter lets meet it.
+    #[inline(always)]
+    fn list<E: Eight>(&self, eight: E, a: u32, near: &mut Vec<u32>) {
+        let t = self.tree;
+        let own = t.tree.components[a as usize];
+        let enter = |other: u32| own == MIXED || (self.filter)(t.representative(own), t.representative(other));
+        t.tree.list(eight, &t.leaves[a as usize].query(), a, enter, near);
+    }
+
+    /// Which pairs of primitives of two leaves still have to be asked for: within one component on each side the filter
+    /// has been asked already.
+    #[inline(always)]
+    fn open_filter(&self, a: u32, b: u32) -> Option<&Filter<'_>> {
+        let components = &self.tree.tree.components;
+        (components[a as usize] == MIXED || components[b as usize] == MIXED).then_some(self.filter)
+    }
+
+    #[inline(always)]
+    fn contacts<E: Eight>(&self, eight: E, a: u32, b: u32, found: &mut Found) {
+        let t = self.tree;
+        let (box_a, box_b) = (t.leaves[a as usize].query(), t.leaves[b as usize].query());
+        let (vertices, edges, faces) = (&t.leaf_vertices, &t.leaf_edges, &t.leaf_faces);
+        let mut side = Side { eight, boxes: &t.boxes, filter: self.open_filter(a, b), out: &mut found.0 };
+        side.pairs::<1, 3, false>(vertices.leaf(a), &box_b, faces.leaf(b), &box_a);
+        if a == b {
+            side.out = &mut found.1;
+            side.pairs_within(edges.leaf(a));
+            return;
+        }
+        side.pairs::<1, 3, false>(vertices.leaf(b), &box_a, faces.leaf(a), &box_b);
+        side.out = &mut found.1;
+        side.pairs::<2, 2, true>(edges.leaf(a), &box_b, edges.leaf(b), &box_a);
+    }
+
+    #[inline(always)]
+    fn edge_faces<E: Eight>(&self, eight: E, a: u32, b: u32, found: &mut Found) {
+        let t = self.tree;
+        let (box_a, box_b) = (t.leaves[a as usize].query(), t.leaves[b as usize].query());
+        let (edges, faces) = (&t.leaf_edges, &t.leaf_faces);
+        let mut side = Side { eight, boxes: &t.boxes, filter: self.open_filter(a, b), out: &mut found.0 };
+        side.pairs::<2, 3, false>(edges.leaf(a), &box_b, faces.leaf(b), &box_a);
+        if a != b {
+            side.pairs::<2, 3, false>(edges.leaf(b), &box_a, faces.leaf(a), &box_b);
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! A tree of boxes over elements: four children a node, eight elements a leaf, boxes in single precision.
+//! A tree of boxes over elements: eight children a node, eight elements a leaf, boxes in single precision.
 //!
 //! Boxes are compared in the tree's own frame: every coordinate goes through one monotone map to `f32`
 //! ([`Frame::packed`]). A monotone map keeps `a <= b`, so boxes that overlap still overlap, however coarse the numbers
@@ -6,7 +6,7 @@
 
 use crate::geometry::Aabb;
 use crate::math::Vec3;
-use crate::math::simd::overlaps;
+use crate::math::simd::Eight;
 
 /// Elements of a leaf.
 pub(super) const LEAF: usize = 8;
@@ -32,26 +32,36 @@ impl PackedBox {
         out
     }
 
-    /// The union of four boxes given by lanes.
-    pub fn of_lanes(low: &[[f32; 4]; 3], high: &[[f32; 4]; 3]) -> PackedBox {
+    /// The union of eight boxes given by lanes; lanes of NaN hold none.
+    #[inline(always)]
+    pub fn of_lanes(low: &Rows, high: &Rows) -> PackedBox {
         let mut out = PackedBox::EMPTY;
         for k in 0..3 {
-            out.low[k] = low[k].iter().copied().fold(f32::INFINITY, f32::min);
-            out.high[k] = high[k].iter().copied().fold(f32::NEG_INFINITY, f32::max);
+            // Where a comparison with NaN is false, the neutral element stays.
+            let mut smallest = low[k].map(|x| if x < f32::INFINITY { x } else { f32::INFINITY });
+            let mut largest = high[k].map(|x| if x > f32::NEG_INFINITY { x } else { f32::NEG_INFINITY });
+            for width in [4, 2, 1] {
+                for i in 0..width {
+                    let (a, b) = (smallest[i + width], largest[i + width]);
+                    smallest[i] = if a < smallest[i] { a } else { smallest[i] };
+                    largest[i] = if b > largest[i] { b } else { largest[i] };
+                }
+            }
+            (out.low[k], out.high[k]) = (smallest[0], largest[0]);
         }
         out
     }
 
-    /// Writes the box into one of four lanes.
+    /// Writes the box into one of eight lanes.
     #[inline(always)]
-    pub fn write(&self, low: &mut [[f32; 4]; 3], high: &mut [[f32; 4]; 3], lane: usize) {
+    pub fn write(&self, low: &mut Rows, high: &mut Rows, lane: usize) {
         for k in 0..3 {
             low[k][lane] = self.low[k];
             high[k][lane] = self.high[k];
         }
     }
 
-    /// For [`overlaps`].
+    /// For [`Eight::overlaps`].
     #[inline(always)]
     pub fn query(&self) -> [f32; 6] {
         let (l, h) = (&self.low, &self.high);
@@ -63,6 +73,9 @@ impl PackedBox {
         side(0) + side(1) + side(2)
     }
 }
+
+/// A coordinate of eight boxes a row.
+pub(super) type Rows = [[f32; 8]; 3];
 
 /// A monotone map of coordinates to single precision: the data's centre to 0, its extent to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,8 +91,10 @@ impl Frame {
         let mut extent: f64 = 0.0;
         for k in 0..3 {
             if bounds.low[k] <= bounds.high[k] {
-                frame.centre[k] = 0.5 * bounds.low[k] + 0.5 * bounds.high[k];
-                extent = extent.max(bounds.high[k] - bounds.low[k]);
+                // A radius may reach to infinity, the centre must not.
+                let (low, high) = (bounds.low[k].max(f64::MIN), bounds.high[k].min(f64::MAX));
+                frame.centre[k] = 0.5 * low + 0.5 * high;
+                extent = extent.max(high - low);
             }
         }
         if extent > 0.0 && extent.is_finite() {
@@ -108,24 +123,24 @@ const NONE: u32 = u32::MAX;
 pub(super) const MIXED: u32 = u32::MAX;
 
 #[derive(Clone, Debug)]
-#[repr(align(16))]
+#[repr(align(32))]
 struct Node {
-    low: [[f32; 4]; 3],
-    high: [[f32; 4]; 3],
-    child: [u32; 4],
+    low: Rows,
+    high: Rows,
+    child: [u32; 8],
     /// Largest leaf number below the child.
-    last: [u32; 4],
+    last: [u32; 8],
     /// Connected component of everything below the child, or [`MIXED`].
-    component: [u32; 4],
+    component: [u32; 8],
 }
 
 impl Node {
     const EMPTY: Node = Node {
-        low: [[f32::INFINITY; 4]; 3],
-        high: [[f32::NEG_INFINITY; 4]; 3],
-        child: [NONE; 4],
-        last: [0; 4],
-        component: [MIXED; 4],
+        low: [[f32::NAN; 8]; 3],
+        high: [[f32::NAN; 8]; 3],
+        child: [NONE; 8],
+        last: [0; 8],
+        component: [MIXED; 8],
     };
 }
 
@@ -141,20 +156,40 @@ pub(super) struct Bvh {
 /// Order of the elements after building: leaf `i` holds `order[LEAF * i..]`, at most [`LEAF`] of them.
 pub(super) type Order = Vec<u32>;
 
+/// An element on its way to its leaf.
+#[derive(Clone, Copy)]
+struct Item {
+    /// Twice the centre of its box in the frame, moved to positive numbers: those have the order of their bits.
+    centre: [f32; 3],
+    element: u32,
+}
+
+impl Item {
+    fn new(bounds: &PackedBox, element: u32) -> Item {
+        Item { centre: std::array::from_fn(|k| (bounds.low[k] + bounds.high[k] + 1.0).max(0.0)), element }
+    }
+
+    /// Total order along a side; elements at equal places by their numbers.
+    #[inline(always)]
+    fn key(&self, axis: usize) -> u64 {
+        u64::from(self.centre[axis].to_bits()) << 32 | u64::from(self.element)
+    }
+}
+
 impl Bvh {
-    /// Builds the tree by halving at the median of the longest side. `components[e]` is the element's component.
+    /// Builds the tree by halving at the median of the longest side. `boxes` are those of the elements,
+    /// `components[e]` is the element's component.
     ///
     /// Cost: `n log n`.
-    pub fn build(centres: &[Vec3], components: &[u32]) -> (Bvh, Order) {
-        let mut keyed: Vec<(Vec3, u32)> = centres.iter().copied().zip(0..).collect();
+    pub fn build(boxes: impl Iterator<Item = PackedBox>, components: &[u32]) -> (Bvh, Order) {
+        let mut items: Vec<Item> = boxes.zip(0..).map(|(b, element)| Item::new(&b, element)).collect();
         let mut tree = Bvh::default();
-        let leaves = keyed.len().div_ceil(LEAF);
-        tree.nodes.reserve(leaves / 2 + 1);
-        if leaves > 0 {
+        if !items.is_empty() {
+            tree.nodes.reserve(items.len() / (4 * LEAF) + 1);
             tree.nodes.push(Node::EMPTY);
-            tree.branch(0, &mut keyed, 0);
+            tree.deal(0, 0, &mut items, 0, 0);
         }
-        let order: Order = keyed.iter().map(|(_, element)| *element).collect();
+        let order: Order = items.iter().map(|item| item.element).collect();
         let uniform = |leaf: &[u32]| {
             let first = components[leaf[0] as usize];
             if leaf.iter().all(|e| components[*e as usize] == first) { first } else { MIXED }
@@ -164,40 +199,34 @@ impl Bvh {
         (tree, order)
     }
 
-    /// Fills node `index` with the four quarters of `keyed`, whose first leaf is `first`.
-    fn branch(&mut self, index: usize, keyed: &mut [(Vec3, u32)], first: u32) {
-        let half = halve(keyed);
-        let (left, right) = keyed.split_at_mut(half);
-        let mut slot = 0;
-        let mut first = first;
-        for part in [left, right] {
-            let quarter = halve(part);
-            let (a, b) = part.split_at_mut(quarter);
-            for elements in [a, b] {
-                let leaves = elements.len().div_ceil(LEAF) as u32;
-                if leaves == 0 {
-                    continue;
-                }
-                self.nodes[index].last[slot] = first + leaves - 1;
-                if leaves == 1 {
-                    self.nodes[index].child[slot] = LEAF_BIT | first;
-                } else {
-                    let child = self.nodes.len();
-                    self.nodes[index].child[slot] = child as u32;
-                    self.nodes.push(Node::EMPTY);
-                    self.branch(child, elements, first);
-                }
-                first += leaves;
-                slot += 1;
-            }
+    /// Puts `items`, whose first leaf is `first`, into node `index` from slot `slot` on, after `halvings` of its three
+    /// levels of halving. Returns the next free slot.
+    fn deal(&mut self, index: usize, slot: usize, items: &mut [Item], first: u32, halvings: u32) -> usize {
+        let leaves = items.len().div_ceil(LEAF);
+        if leaves > 1 && halvings < 3 {
+            let split = leaves / 2 * LEAF;
+            halve(items, split);
+            let (left, right) = items.split_at_mut(split);
+            let slot = self.deal(index, slot, left, first, halvings + 1);
+            return self.deal(index, slot, right, first + (leaves / 2) as u32, halvings + 1);
         }
+        self.nodes[index].last[slot] = first + leaves as u32 - 1;
+        if leaves == 1 {
+            self.nodes[index].child[slot] = LEAF_BIT | first;
+        } else {
+            let child = self.nodes.len();
+            self.nodes[index].child[slot] = child as u32;
+            self.nodes.push(Node::EMPTY);
+            self.deal(child, 0, items, first, 0);
+        }
+        slot + 1
     }
 
     /// Components of branches, from those of the leaves.
     fn label(&mut self) {
         let mut below = vec![MIXED; self.nodes.len()];
         for index in (0..self.nodes.len()).rev() {
-            for slot in 0..4 {
+            for slot in 0..8 {
                 let child = self.nodes[index].child[slot];
                 self.nodes[index].component[slot] = match child {
                     NONE => continue,
@@ -206,7 +235,7 @@ impl Bvh {
                 };
             }
             let node = &self.nodes[index];
-            let used = || (0..4).filter(|s| node.child[*s] != NONE).map(|s| node.component[s]);
+            let used = || (0..8).filter(|s| node.child[*s] != NONE).map(|s| node.component[s]);
             let first = used().next().unwrap_or(MIXED);
             below[index] = if used().all(|c| c == first) { first } else { MIXED };
         }
@@ -217,7 +246,7 @@ impl Bvh {
     pub fn refit(&mut self, leaves: &[PackedBox]) -> f64 {
         let mut total = 0.0;
         for index in (0..self.nodes.len()).rev() {
-            for slot in 0..4 {
+            for slot in 0..8 {
                 let b = match self.nodes[index].child[slot] {
                     NONE => continue,
                     leaf if leaf & LEAF_BIT != 0 => leaves[(leaf & !LEAF_BIT) as usize],
@@ -234,30 +263,27 @@ impl Bvh {
         total
     }
 
-    /// Calls `visit` for every leaf numbered `from` or higher whose box overlaps or touches `b`. Branches for whose
-    /// component `enter` says no are left out ([`MIXED`] branches are always entered).
+    /// Lists every leaf numbered `from` or higher whose box overlaps or touches `b`. Branches for whose component
+    /// `enter` says no are left out ([`MIXED`] branches are always entered).
     #[inline(always)]
-    pub fn visit(&self, b: &[f32; 6], from: u32, enter: impl Fn(u32) -> bool, mut visit: impl FnMut(u32)) {
-        // A branch halves twice a level: 2^32 leaves are 16 levels of at most three open siblings.
-        let mut stack = [0_u32; 64];
+    pub fn list<E: Eight>(&self, eight: E, b: &[f32; 6], from: u32, enter: impl Fn(u32) -> bool, out: &mut Vec<u32>) {
+        out.clear();
+        // A branch halves at least once a level: 2^28 leaves are 28 levels of at most seven open siblings.
+        let mut stack = [0_u32; 256];
         let mut open = usize::from(!self.nodes.is_empty());
         while open > 0 {
             open -= 1;
             let node = &self.nodes[stack[open] as usize];
-            let mut mask = overlaps::<false>(&node.low, &node.high, b);
+            let mut mask = eight.overlaps::<false>(&node.low, &node.high, b);
             while mask != 0 {
                 let slot = mask.trailing_zeros() as usize;
                 mask &= mask - 1;
-                // Boxes may be infinite: an empty slot can seem to overlap.
-                if node.child[slot] == NONE || node.last[slot] < from {
-                    continue;
-                }
-                if !(node.component[slot] == MIXED || enter(node.component[slot])) {
+                if node.last[slot] < from || !(node.component[slot] == MIXED || enter(node.component[slot])) {
                     continue;
                 }
                 let child = node.child[slot];
                 if child & LEAF_BIT != 0 {
-                    visit(child & !LEAF_BIT);
+                    out.push(child & !LEAF_BIT);
                 } else {
                     stack[open] = child;
                     open += 1;
@@ -267,18 +293,17 @@ impl Bvh {
     }
 }
 
-/// Where to split so that the left part has whole leaves, after ordering the elements about that place along the
-/// longest side of their centres. Equal coordinates are ordered by element number.
-fn halve(keyed: &mut [(Vec3, u32)]) -> usize {
-    let leaves = keyed.len().div_ceil(LEAF);
-    if leaves < 2 {
-        return keyed.len();
+/// Moves the elements that come first along the longest side of the centres before `split`, the others behind it.
+fn halve(items: &mut [Item], split: usize) {
+    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for item in items.iter() {
+        for k in 0..3 {
+            let x = item.centre[k];
+            low[k] = if x < low[k] { x } else { low[k] };
+            high[k] = if x > high[k] { x } else { high[k] };
+        }
     }
-    let mut bounds = Aabb::EMPTY;
-    for (x, _) in keyed.iter() {
-        bounds = bounds.union(&Aabb { low: *x, high: *x });
-    }
-    let side = |k: usize| bounds.high[k] - bounds.low[k];
+    let side = |k: usize| high[k] - low[k];
     let axis = if side(0) >= side(1) && side(0) >= side(2) {
         0
     } else if side(1) >= side(2) {
@@ -286,7 +311,5 @@ fn halve(keyed: &mut [(Vec3, u32)]) -> usize {
     } else {
         2
     };
-    let split = leaves / 2 * LEAF;
-    keyed.select_nth_unstable_by(split, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
-    split
+    items.select_nth_unstable_by_key(split, |item| item.key(axis));
 }

@@ -1,48 +1,51 @@
-//! The primitives of one kind in the order of the tree's leaves, four side by side.
+//! The primitives of one kind in the order of the tree's leaves, eight side by side.
 
-use super::bvh::PackedBox;
-use crate::math::simd::{equals, overlaps};
+use super::bvh::{PackedBox, Rows};
+use super::ownership::Lists;
+use crate::math::simd::Eight;
 use crate::parallel::Par;
 
 /// No primitive in this lane.
 const NONE: u32 = u32::MAX;
 
-/// Four primitives with `N` vertices each: boxes, vertices and numbers by lane.
+/// Eight primitives with `N` vertices each: boxes, vertices and numbers by lane.
 #[derive(Clone, Debug)]
-#[repr(align(16))]
+#[repr(align(32))]
 pub(super) struct Block<const N: usize> {
-    low: [[f32; 4]; 3],
-    high: [[f32; 4]; 3],
-    corners: [[u32; 4]; N],
+    low: Rows,
+    high: Rows,
+    corners: [[u32; 8]; N],
     /// Vertex index, edge number or face number.
-    numbers: [u32; 4],
-    /// One bit per lane that holds a primitive.
-    used: i32,
+    pub numbers: [u32; 8],
+    /// Lanes that hold a primitive, from the first on; the boxes of the others are NaN.
+    used: usize,
 }
 
 impl<const N: usize> Block<N> {
+    const EMPTY: Block<N> = Block {
+        low: [[f32::NAN; 8]; 3],
+        high: [[f32::NAN; 8]; 3],
+        corners: [[NONE; 8]; N],
+        numbers: [NONE; 8],
+        used: 0,
+    };
+
     /// Bits of the primitives whose boxes overlap or touch the query.
     #[inline(always)]
-    pub fn near(&self, query: &[f32; 6]) -> i32 {
-        overlaps::<false>(&self.low, &self.high, query) & self.used
+    pub fn near<E: Eight>(&self, eight: E, query: &[f32; 6]) -> u32 {
+        eight.overlaps::<false>(&self.low, &self.high, query)
     }
 
     /// Bits of the lanes whose overlap is certain.
     #[inline(always)]
-    pub fn proven(&self, query: &[f32; 6]) -> i32 {
-        overlaps::<true>(&self.low, &self.high, query)
+    pub fn proven<E: Eight>(&self, eight: E, query: &[f32; 6]) -> u32 {
+        eight.overlaps::<true>(&self.low, &self.high, query)
     }
 
     /// Bits of the primitives that have one of the vertices.
     #[inline(always)]
-    pub fn sharing<const M: usize>(&self, vertices: &[u32; M]) -> i32 {
-        let mut mask = 0;
-        for v in vertices {
-            for corners in &self.corners {
-                mask |= equals(corners, *v);
-            }
-        }
-        mask
+    pub fn sharing<E: Eight, const M: usize>(&self, eight: E, vertices: &[u32; M]) -> u32 {
+        eight.any_equal(&self.corners, vertices)
     }
 
     #[inline(always)]
@@ -56,14 +59,21 @@ impl<const N: usize> Block<N> {
         std::array::from_fn(|k| self.corners[k][lane])
     }
 
-    #[inline(always)]
-    pub fn number(&self, lane: usize) -> u32 {
-        self.numbers[lane]
-    }
-
     /// The box of all lanes.
+    #[inline(always)]
     pub fn bounds(&self) -> PackedBox {
         PackedBox::of_lanes(&self.low, &self.high)
+    }
+
+    fn refit(&mut self, vertices: &[PackedBox]) {
+        for lane in 0..self.used {
+            let corners = self.corners(lane);
+            let mut bounds = vertices[corners[0] as usize];
+            for v in &corners[1..] {
+                bounds = bounds.union(&vertices[*v as usize]);
+            }
+            bounds.write(&mut self.low, &mut self.high, lane);
+        }
     }
 }
 
@@ -76,29 +86,34 @@ pub(super) struct LeafBlocks<const N: usize> {
 }
 
 impl<const N: usize> LeafBlocks<N> {
-    /// From the numbers of each leaf, one after the other.
-    pub fn arrange<'a>(leaves: impl Iterator<Item = &'a [u32]>, corners: impl Fn(u32) -> [u32; N]) -> Self {
-        let mut out = LeafBlocks { blocks: Vec::new(), offsets: vec![0] };
-        for numbers in leaves {
-            for four in numbers.chunks(4) {
-                let mut block = Block {
-                    low: [[f32::INFINITY; 4]; 3],
-                    high: [[f32::NEG_INFINITY; 4]; 3],
-                    corners: [[NONE; 4]; N],
-                    numbers: [NONE; 4],
-                    used: (1 << four.len()) - 1,
-                };
-                for (lane, number) in four.iter().enumerate() {
-                    block.numbers[lane] = *number;
-                    for (k, v) in corners(*number).into_iter().enumerate() {
-                        block.corners[k][lane] = v;
-                    }
+    /// Holds the primitives of each leaf's elements from now on, one after the other.
+    pub fn arrange<'a>(
+        &mut self,
+        leaves: impl ExactSizeIterator<Item = &'a [u32]>,
+        owned: &Lists,
+        corners: impl Fn(u32) -> [u32; N],
+    ) {
+        let LeafBlocks { blocks, offsets } = self;
+        blocks.clear();
+        blocks.reserve(leaves.len() + owned.total() / 8);
+        offsets.clear();
+        offsets.push(0);
+        for leaf in leaves {
+            let first = blocks.len();
+            for number in leaf.iter().flat_map(|element| owned.of(*element)) {
+                if blocks.len() == first || blocks[blocks.len() - 1].used == 8 {
+                    blocks.push(Block::EMPTY);
                 }
-                out.blocks.push(block);
+                let last = blocks.len() - 1;
+                let block = &mut blocks[last];
+                block.numbers[block.used] = *number;
+                for (row, v) in block.corners.iter_mut().zip(corners(*number)) {
+                    row[block.used] = v;
+                }
+                block.used += 1;
             }
-            out.offsets.push(out.blocks.len() as u32);
+            offsets.push(blocks.len() as u32);
         }
-        out
     }
 
     #[inline(always)]
@@ -108,20 +123,6 @@ impl<const N: usize> LeafBlocks<N> {
 
     /// New boxes: the unions of the boxes of the vertices. Cost: linear.
     pub fn refit(&mut self, vertices: &[PackedBox], par: Par) {
-        par.for_each_block(&mut self.blocks, |_, blocks| {
-            for block in blocks {
-                for lane in 0..4 {
-                    if block.used >> lane & 1 == 0 {
-                        continue;
-                    }
-                    let corners = block.corners(lane);
-                    let mut bounds = vertices[corners[0] as usize];
-                    for v in &corners[1..] {
-                        bounds = bounds.union(&vertices[*v as usize]);
-                    }
-                    bounds.write(&mut block.low, &mut block.high, lane);
-                }
-            }
-        });
+        par.for_each_block(&mut self.blocks, |_, blocks| blocks.iter_mut().for_each(|block| block.refit(vertices)));
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! * `primitives`: the collision primitives of a whole model, their motion, and the pairs found among them
 //! * `brute_force`: every pair tested; the oracle of the other structures
-//! * `ownership`, `bvh`, `leaf_blocks`, `pair_lists`, `broad_phase`: the same candidates by a tree of boxes
+//! * `ownership`, `bvh`, `leaf_blocks`, `leaf_pairs`, `pair_lists`, `broad_phase`: the same candidates by a tree of boxes
 //! * `proximity`: near pairs at a state, with weights, normals and distances
 //! * `intersection`: the certificate, edges against faces by exact predicates
 //! * `ccd`: continuous detection of one pair
@@ -13,6 +13,7 @@ mod bvh;
 pub mod ccd;
 pub mod intersection;
 mod leaf_blocks;
+mod leaf_pairs;
 mod ownership;
 mod pair_lists;
 mod primitives;

@@ -29,6 +29,12 @@ impl Lists {
         Lists { offsets, numbers }
     }
 
+    /// How many numbers there are in all.
+    pub fn total(&self) -> usize {
+        self.numbers.len()
+    }
+
+    #[inline(always)]
     pub fn of(&self, element: u32) -> &[u32] {
         &self.numbers[self.offsets[element as usize] as usize..self.offsets[element as usize + 1] as usize]
     }
@@ -43,17 +49,12 @@ pub(super) struct Ownership {
     pub vertices: Lists,
     /// Edges of each element, at most three; each edge once.
     pub edges: Lists,
+    /// Each face by itself, none for the other elements.
+    pub faces: Lists,
     /// Connected component of each element.
     pub components: Vec<u32>,
     /// A vertex of each component.
     pub representatives: Vec<u32>,
-}
-
-impl Ownership {
-    /// Number of elements.
-    pub fn elements(&self) -> usize {
-        self.components.len()
-    }
 }
 
 const NOBODY: u32 = u32::MAX;
@@ -97,6 +98,10 @@ pub(super) fn own(primitives: &Primitives) -> Ownership {
     }
     out.vertices = Lists::collect(element as usize, &vertex_pairs);
     out.edges = Lists::collect(element as usize, &edge_pairs);
+    out.faces = Lists {
+        offsets: (0..=element).map(|e| e.min(faces.len() as u32)).collect(),
+        numbers: (0..faces.len() as u32).collect(),
+    };
     connect(&mut out, size, edges, faces);
     out
 }

@@ -1,26 +1,55 @@
 //! Lists of pairs brought into one stable order.
 
+use crate::math::simd::Eight;
 use crate::parallel::Par;
 
 /// Pairs found by the tasks of a traversal.
-pub(super) type PairLists = Vec<Vec<[u32; 2]>>;
+pub(super) type PairLists = Vec<PairBuffer>;
+
+/// A list that takes up to eight pairs at once.
+#[derive(Default)]
+pub(super) struct PairBuffer {
+    pairs: Vec<[u32; 2]>,
+    used: usize,
+}
+
+impl PairBuffer {
+    /// Appends `[first, seconds[i]]` for the lanes of the mask; see [`Eight::pairs`].
+    #[inline(always)]
+    pub fn push<E: Eight, const ASCENDING: bool>(&mut self, eight: E, first: u32, seconds: &[u32; 8], mask: u32) {
+        if self.pairs.len() < self.used + 8 {
+            self.grow();
+        }
+        if let Some(out) = self.pairs[self.used..].first_chunk_mut() {
+            self.used += eight.pairs::<ASCENDING>(first, seconds, mask, out);
+        }
+    }
+
+    #[cold]
+    fn grow(&mut self) {
+        self.pairs.resize((2 * self.pairs.len()).max(512), [0; 2]);
+    }
+
+    fn pairs(&self) -> &[[u32; 2]] {
+        &self.pairs[..self.used]
+    }
+}
 
 /// Joins the lists into `out`, sorted by first and then second number; first numbers are below `range`.
 ///
 /// Cost: linear where no first number has many partners.
 pub(super) fn merge(lists: PairLists, range: usize, out: &mut Vec<[u32; 2]>, par: Par) {
-    let total: usize = lists.iter().map(Vec::len).sum();
+    let total: usize = lists.iter().map(|list| list.used).sum();
     let mut ends = vec![0_u32; range + 1];
-    for pair in lists.iter().flatten() {
+    for pair in lists.iter().flat_map(PairBuffer::pairs) {
         ends[pair[0] as usize + 1] += 1;
     }
     for i in 0..range {
         ends[i + 1] += ends[i];
     }
-    out.clear();
     out.resize(total, [0; 2]);
     // `ends[i]` runs from the start of number i to its end while the pairs are put down.
-    for pair in lists.iter().flatten() {
+    for pair in lists.iter().flat_map(PairBuffer::pairs) {
         let place = &mut ends[pair[0] as usize];
         out[*place as usize] = *pair;
         *place += 1;
@@ -38,8 +67,25 @@ pub(super) fn merge(lists: PairLists, range: usize, out: &mut Vec<[u32; 2]>, par
     }
     groups.push(rest);
     par.for_each_task(&mut groups, |group| {
-        for run in group.chunk_by_mut(|a, b| a[0] == b[0]) {
-            run.sort_unstable_by_key(|pair| pair[1]);
-        }
+        group.chunk_by_mut(|a, b| a[0] == b[0]).for_each(sort_by_second);
     });
+}
+
+/// Sorts pairs with one first number by their second one.
+#[inline(always)]
+fn sort_by_second(run: &mut [[u32; 2]]) {
+    if run.len() > 20 {
+        run.sort_unstable_by_key(|pair| pair[1]);
+        return;
+    }
+    // Most runs are a few pairs long: a call would cost more than the work.
+    for i in 1..run.len() {
+        let pair = run[i];
+        let mut place = i;
+        while place > 0 && run[place - 1][1] > pair[1] {
+            run[place] = run[place - 1];
+            place -= 1;
+        }
+        run[place] = pair;
+    }
 }

@@ -40,6 +40,8 @@ fn same_candidates_as_brute_force() {
         let some = compare(&scene, &mut tree, &between, Par::Serial);
         assert!(some <= all);
         assert_eq!(0, compare(&scene, &mut tree, &|_, _| false, Par::Serial));
+        tree.rebuild(&scene.x0, &scene.x1, &scene.radius, Par::Serial);
+        assert_eq!(all, compare(&scene, &mut tree, &|_, _| true, Par::Serial), "{}", scene.name);
         total += all;
     }
     assert!(total > 10_000, "the scenes have only {total} candidates");

@@ -1,9 +1,9 @@
 //! Several numbers at once, with the same answers and the same bits on every processor.
 //!
-//! * `compare`: four boxes against one, one bit a lane
+//! * `eight`: eight boxes against one, one bit a lane, and pairs from such bits
 //! * `lanes`: a few doubles side by side, and kernels compiled once more for wide instructions
 
-mod compare;
+mod eight;
 mod lanes;
-pub use compare::{equals, overlaps};
+pub use eight::{Eight, EightKernel, run_eight};
 pub use lanes::{Kernel, Lanes, run_wide};
