@@ -1,11 +1,12 @@
 //! Continuous detection of a segment: which pairs come closer than their minimum separation on straight chords.
 
+use super::candidates::primitives;
 use super::contact::{Contact, half_space_contact, mesh_contact};
 use super::near::{candidate, half_space_pairs};
 use super::pair::{BodyFilter, Pair, PairKind, gather};
 use super::passing::Passing;
 use crate::detection::Candidates;
-use crate::detection::ccd::{edge_edge, point_triangle};
+use crate::detection::ccd::{self, Separation};
 use crate::math::predicates::plane_side;
 use crate::math::{Vec3, lerp, norm_squared, sub};
 use crate::model::{Model, State, Witness};
@@ -51,9 +52,10 @@ pub fn swept_hits(
     par: Par,
 ) -> Vec<Hit> {
     let count = candidates.vertex_face.len() + candidates.edge_edge.len();
-    let found = par
-        .map_indexed(count, |i| mesh_hit(model, passing, candidate(candidates, i), &start.positions, &end.positions));
-    let mut hits: Vec<Hit> = found.into_iter().flatten().collect();
+    let (x0, x1) = (&start.positions[..], &end.positions[..]);
+    let found = par.map_indexed(count, |i| question(model, passing, candidate(candidates, i), x0, x1));
+    let questions: Vec<Question> = found.into_iter().flatten().collect();
+    let mut hits = mesh_hits(model, &questions, x0, x1, par);
     hits.extend(half_space_pairs(model, filter).filter_map(|pair| half_space_hit(model, passing, pair, start, end)));
     hits
 }
@@ -64,7 +66,15 @@ pub fn minimum_separation(thickness: f64, start_distance: f64) -> f64 {
     0.5 * thickness.min(start_distance)
 }
 
-fn mesh_hit(model: &Model, passing: &Passing, pair: Pair, x0: &[Vec3], x1: &[Vec3]) -> Option<Hit> {
+/// A pair that may come closer than a separation.
+struct Question {
+    pair: Pair,
+    thickness: f64,
+    separation: f64,
+}
+
+/// What to ask continuous detection about a pair; `None` where its distance and its motion answer already.
+fn question(model: &Model, passing: &Passing, pair: Pair, x0: &[Vec3], x1: &[Vec3]) -> Option<Question> {
     let vertices = pair.vertices(model);
     if passing.touches(&vertices) {
         return None;
@@ -82,19 +92,34 @@ fn mesh_hit(model: &Model, passing: &Passing, pair: Pair, x0: &[Vec3], x1: &[Vec
         return None;
     }
     let thickness = pair.thickness(model)?;
-    let separation = minimum_separation(thickness, distance);
-    let time = match (pair.kind, separation > 0.0) {
-        (PairKind::EdgeEdge, true) => edge_edge::time_of_impact_with_separation(&p0, &p1, separation, 1.0),
-        (PairKind::EdgeEdge, false) => edge_edge::time_of_impact(&p0, &p1, 1.0),
-        (_, true) => point_triangle::time_of_impact_with_separation(&p0, &p1, separation, 1.0),
-        (_, false) => point_triangle::time_of_impact(&p0, &p1, 1.0),
-    }?;
-    let mut at = p0;
-    for k in 0..4 {
-        at[k] = lerp(p0[k], p1[k], time);
-    }
-    let contact = mesh_contact(model, pair, 0, &pair.closest_points(&at), &at, &p0, thickness);
-    Some(Hit { pair, time, contact })
+    Some(Question { pair, thickness, separation: minimum_separation(thickness, distance) })
+}
+
+/// The questions, vertex-face pairs first, that continuous detection answers with a hit.
+fn mesh_hits(model: &Model, questions: &[Question], x0: &[Vec3], x1: &[Vec3], par: Par) -> Vec<Hit> {
+    let (vertex_face, edge_edge) =
+        questions.split_at(questions.partition_point(|q| q.pair.kind == PairKind::VertexFace));
+    let features = |list: &[Question]| list.iter().map(|q| q.pair.features).collect();
+    let separations = |list: &[Question]| -> Vec<f64> { list.iter().map(|q| q.separation).collect() };
+    let pairs =
+        Candidates { vertex_face: features(vertex_face), edge_edge: features(edge_edge), ..Candidates::default() };
+    let separation = Separation::PerPair { vertex_face: &separations(vertex_face), edge_edge: &separations(edge_edge) };
+    // Hits come in the order of the questions.
+    let mut rest = questions.iter();
+    let times = ccd::hits(x0, x1, &primitives(model), &pairs, separation, par);
+    let hit = times.into_iter().filter_map(|found| {
+        let (kind, features) = match found.pair {
+            ccd::Pair::VertexFace(features) => (PairKind::VertexFace, features),
+            ccd::Pair::EdgeEdge(features) => (PairKind::EdgeEdge, features),
+        };
+        let Question { pair, thickness, .. } = rest.find(|q| q.pair == Pair { kind, features })?;
+        let vertices = pair.vertices(model);
+        let (p0, p1) = (gather(vertices, x0), gather(vertices, x1));
+        let at = std::array::from_fn(|k| lerp(p0[k], p1[k], found.time));
+        let contact = mesh_contact(model, *pair, 0, &pair.closest_points(&at), &at, &p0, *thickness);
+        Some(Hit { pair: *pair, time: found.time, contact })
+    });
+    hit.collect()
 }
 
 /// The largest relative displacement of a vertex of one primitive against one of the other, and what rounding may hide

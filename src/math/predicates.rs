@@ -4,8 +4,7 @@
 //! `2^-250` to `2^300` (about `5e-76` to `2e90`). Outside that range, integer arithmetic without limits: same answers,
 //! some microseconds each.
 
-use super::{Vec3, decompose};
-use num_bigint::{BigInt, Sign};
+use super::{Integer, Vec3, decompose};
 use robust::{Coord, Coord3D};
 
 const SMALL: f64 = 5.527_147_875_260_445e-76;
@@ -18,34 +17,30 @@ fn in_range(coordinates: &[f64]) -> bool {
 /// The number `integer * 2^exponent`.
 #[derive(Clone)]
 struct Dyadic {
-    integer: BigInt,
+    integer: Integer,
     exponent: i64,
 }
 
 impl Dyadic {
     fn new(x: f64) -> Dyadic {
         let (mantissa, exponent) = decompose(x.abs());
-        let integer = BigInt::from(mantissa);
-        Dyadic { integer: if x < 0.0 { -integer } else { integer }, exponent: i64::from(exponent) }
+        let integer = Integer::from(mantissa);
+        Dyadic { integer: if x < 0.0 { integer.negated() } else { integer }, exponent: i64::from(exponent) }
     }
 
     fn plus(&self, other: &Dyadic, sign: i32) -> Dyadic {
         let exponent = self.exponent.min(other.exponent);
-        let a = &self.integer << (self.exponent - exponent) as u64;
-        let b = &other.integer << (other.exponent - exponent) as u64;
-        Dyadic { integer: if sign < 0 { a - b } else { a + b }, exponent }
+        let a = self.integer.shifted_up((self.exponent - exponent) as u64);
+        let b = other.integer.shifted_up((other.exponent - exponent) as u64);
+        Dyadic { integer: if sign < 0 { a.minus(&b) } else { a.plus(&b) }, exponent }
     }
 
     fn times(&self, other: &Dyadic) -> Dyadic {
-        Dyadic { integer: &self.integer * &other.integer, exponent: self.exponent + other.exponent }
+        Dyadic { integer: self.integer.times(&other.integer), exponent: self.exponent + other.exponent }
     }
 
     fn sign(&self) -> i32 {
-        match self.integer.sign() {
-            Sign::Minus => -1,
-            Sign::NoSign => 0,
-            Sign::Plus => 1,
-        }
+        self.integer.sign()
     }
 }
 

@@ -6,6 +6,7 @@
 use super::coplanarity::{Frame, Point, axis_gap, plane_gap};
 use super::exact::Shape;
 use super::motion::{EdgeEdge, Kind, VertexFace};
+use super::roots::only_root;
 use super::{filter, separation};
 use crate::detection::{Candidates, Primitives};
 use crate::math::simd::{Kernel, Lanes, run_wide};
@@ -14,6 +15,9 @@ use crate::parallel::Par;
 
 /// Pairs side by side.
 const WIDTH: usize = 4;
+
+/// Pairs side by side where roots are sought: two chains of operations overlap.
+const ROOT_WIDTH: usize = 8;
 
 /// Pairs filtered in one go.
 const BLOCK: usize = 512;
@@ -183,32 +187,26 @@ impl List<'_> {
     fn block<const N: usize, K: Kind<N>>(&self, b: usize, t_max: f64, mut keep: impl FnMut(Hit, &mut f64)) {
         let start = b * BLOCK;
         let count = BLOCK.min(self.pairs.len() - start);
+        let separated = self.per_pair.is_some() || self.uniform > 0.0;
         let mut open = [0_u16; BLOCK];
-        let open = if self.finite {
-            let separated = self.per_pair.is_some() || self.uniform > 0.0;
-            let filled =
-                run_wide(BlockFilter { list: self, shape: K::SHAPE, start, count, t_max, separated, open: &mut open });
-            &open[..filled]
+        let mut times = [f64::NAN; BLOCK];
+        let mut filled = count;
+        if self.finite {
+            let filter = BlockFilter { list: self, shape: K::SHAPE, start, count, t_max, separated, open: &mut open };
+            filled = run_wide(filter);
+            if !separated {
+                let open = &open[..filled];
+                run_wide(BlockRoots { list: self, shape: K::SHAPE, start, t_max, open, times: &mut times });
+            }
         } else {
             for (i, o) in open.iter_mut().enumerate() {
                 *o = i as u16;
             }
-            &open[..count]
-        };
+        }
         let mut t_max = t_max;
-        for o in open {
+        for (o, time) in open[..filled].iter().zip(times) {
             let i = start + *o as usize;
-            let v = self.vertices(K::SHAPE, i);
-            let (x0, x1) = (v.map(|v| self.step.x0[v]), v.map(|v| self.step.x1[v]));
-            let s = self.separation(i);
-            let time = if s > 0.0 {
-                separation::first_approach::<N, K>(&x0, &x1, s, t_max, separation::MAX_INTERVALS)
-            } else if self.finite {
-                let frame = Frame::new(K::SHAPE, &filter::single(&x0), &filter::single(&x1));
-                filter::after_plane_test::<N, K>(&x0, &x1, &frame, t_max)
-            } else {
-                filter::time_of_impact::<N, K>(&x0, &x1, t_max)
-            };
+            let time = if time.is_nan() { self.single::<N, K>(i, t_max) } else { (time <= t_max).then_some(time) };
             if let Some(time) = time {
                 let pair = match K::SHAPE {
                     Shape::VertexFace => Pair::VertexFace(self.pairs[i]),
@@ -218,6 +216,49 @@ impl List<'_> {
             }
         }
     }
+
+    /// The kernel for one pair that the tests of several pairs at once left open.
+    fn single<const N: usize, K: Kind<N>>(&self, i: usize, t_max: f64) -> Option<f64> {
+        let v = self.vertices(K::SHAPE, i);
+        let (x0, x1) = (v.map(|v| self.step.x0[v]), v.map(|v| self.step.x1[v]));
+        let s = self.separation(i);
+        if s > 0.0 {
+            separation::first_approach::<N, K>(&x0, &x1, s, t_max, separation::MAX_INTERVALS)
+        } else if self.finite {
+            let frame = Frame::new(K::SHAPE, &filter::single(&x0), &filter::single(&x1));
+            filter::after_plane_test::<N, K>(&x0, &x1, &frame, t_max)
+        } else {
+            filter::time_of_impact::<N, K>(&x0, &x1, t_max)
+        }
+    }
+
+    /// The points of several pairs at both ends of the step.
+    #[inline(always)]
+    fn gather<const L: usize>(&self, shape: Shape, pairs: &[usize; L]) -> ([Point<L>; 4], [Point<L>; 4]) {
+        let mut v = [[0; 4]; L];
+        for l in 0..L {
+            v[l] = self.vertices(shape, pairs[l]);
+        }
+        (transposed(self.step.x0, &v), transposed(self.step.x1, &v))
+    }
+}
+
+/// The four points of several pairs, coordinate by coordinate.
+#[inline(always)]
+fn transposed<const L: usize>(x: &[Vec3], v: &[[usize; 4]; L]) -> [Point<L>; 4] {
+    let mut points = [[Lanes([0.0; L]); 3]; 4];
+    for k in 0..4 {
+        let mut p = [[0.0; 3]; L];
+        for l in 0..L {
+            p[l] = x[v[l][k]];
+        }
+        for c in 0..3 {
+            for l in 0..L {
+                points[k][c].0[l] = p[l][c];
+            }
+        }
+    }
+    points
 }
 
 /// Rules out pairs, several at once; what is left is listed in `open`, relative to `start`.
@@ -247,21 +288,16 @@ impl BlockFilter<'_> {
     #[inline(always)]
     fn run_shape(self, shape: Shape) -> usize {
         let mut filled = 0;
-        let zero = [[Lanes([0.0; WIDTH]); 3]; 4];
         for group in (0..self.count).step_by(WIDTH) {
             let width = WIDTH.min(self.count - group);
-            let (mut x0, mut x1): ([Point<WIDTH>; 4], [Point<WIDTH>; 4]) = (zero, zero);
+            // Lanes beyond the last pair repeat it.
+            let mut pairs = [self.start + group; WIDTH];
             let mut s = Lanes([0.0; WIDTH]);
-            for l in 0..width {
-                let i = self.start + group + l;
-                s.0[l] = self.list.separation(i);
-                for (k, v) in self.list.vertices(shape, i).into_iter().enumerate() {
-                    for c in 0..3 {
-                        x0[k][c].0[l] = self.list.step.x0[v][c];
-                        x1[k][c].0[l] = self.list.step.x1[v][c];
-                    }
-                }
+            for l in 0..WIDTH {
+                pairs[l] += l.min(width - 1);
+                s.0[l] = self.list.separation(pairs[l]);
             }
+            let (x0, x1) = self.list.gather(shape, &pairs);
             let frame = Frame::new(shape, &x0, &x1);
             let gap = if self.separated {
                 axis_gap(shape, &x0, &x1, s, self.t_max).max(plane_gap(&frame, Some(s), self.t_max))
@@ -274,5 +310,43 @@ impl BlockFilter<'_> {
             }
         }
         filled
+    }
+}
+
+/// Decides pairs whose cubic has a single root, several at once; the others stay NaN in `times`.
+struct BlockRoots<'a> {
+    list: &'a List<'a>,
+    shape: Shape,
+    start: usize,
+    t_max: f64,
+    open: &'a [u16],
+    times: &'a mut [f64; BLOCK],
+}
+
+impl Kernel for BlockRoots<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        match self.shape {
+            Shape::VertexFace => self.run_shape(Shape::VertexFace),
+            Shape::EdgeEdge => self.run_shape(Shape::EdgeEdge),
+        }
+    }
+}
+
+impl BlockRoots<'_> {
+    #[inline(always)]
+    fn run_shape(self, shape: Shape) {
+        for (group, times) in self.open.chunks(ROOT_WIDTH).zip(self.times.chunks_mut(ROOT_WIDTH)) {
+            // Lanes beyond the last pair repeat the first one.
+            let mut pairs = [self.start + group[0] as usize; ROOT_WIDTH];
+            for (pair, o) in pairs.iter_mut().zip(group) {
+                *pair = self.start + *o as usize;
+            }
+            let (x0, x1) = self.list.gather(shape, &pairs);
+            let found = only_root(shape, &Frame::new(shape, &x0, &x1), self.t_max).0;
+            times[..group.len()].copy_from_slice(&found[..group.len()]);
+        }
     }
 }

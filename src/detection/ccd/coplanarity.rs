@@ -35,14 +35,26 @@ fn dot<const L: usize>(a: &Point<L>, b: &Point<L>) -> Lanes<L> {
 }
 
 #[inline(always)]
-fn cross<const L: usize>(a: &Point<L>, b: &Point<L>) -> Point<L> {
+pub(super) fn cross<const L: usize>(a: &Point<L>, b: &Point<L>) -> Point<L> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[inline(always)]
-fn largest<const L: usize>(a: &Point<L>, b: &Point<L>) -> Lanes<L> {
-    let m = |p: &Point<L>| p[0].abs().max(p[1].abs()).max(p[2].abs());
-    m(a).max(m(b))
+fn largest<const L: usize>([a, b]: &[Point<L>; 2]) -> Lanes<L> {
+    let at_start = a[0].abs().max(a[1].abs()).max(a[2].abs());
+    at_start.max(b[0].abs().max(b[1].abs()).max(b[2].abs()))
+}
+
+/// From point j to point i at both ends.
+#[inline(always)]
+fn between<const L: usize>(x0: &[Point<L>; 4], x1: &[Point<L>; 4], i: usize, j: usize) -> [Point<L>; 2] {
+    [sub(&x0[i], &x0[j]), sub(&x1[i], &x1[j])]
+}
+
+/// The smallest of four.
+#[inline(always)]
+fn least<const L: usize>(b: &[Lanes<L>; 4]) -> Lanes<L> {
+    b[0].min(b[1]).min(b[2].min(b[3]))
 }
 
 /// A pair's spanning vectors e, f and the vector g at both ends of the step.
@@ -56,17 +68,16 @@ impl<const L: usize> Frame<L> {
     /// From the four points at both ends.
     #[inline(always)]
     pub fn new(shape: Shape, x0: &[Point<L>; 4], x1: &[Point<L>; 4]) -> Self {
-        let pick = |i: usize, j: usize| [sub(&x0[i], &x0[j]), sub(&x1[i], &x1[j])];
         match shape {
-            Shape::VertexFace => Frame { e: pick(2, 1), f: pick(3, 1), g: pick(0, 1) },
-            Shape::EdgeEdge => Frame { e: pick(1, 0), f: pick(3, 2), g: pick(2, 0) },
+            Shape::VertexFace => Frame { e: between(x0, x1, 2, 1), f: between(x0, x1, 3, 1), g: between(x0, x1, 0, 1) },
+            Shape::EdgeEdge => Frame { e: between(x0, x1, 1, 0), f: between(x0, x1, 3, 2), g: between(x0, x1, 2, 0) },
         }
     }
 
     /// Largest absolute components of e, f, g over both ends.
     #[inline(always)]
     pub fn sizes(&self) -> [Lanes<L>; 3] {
-        [&self.e, &self.f, &self.g].map(|v| largest(&v[0], &v[1]))
+        [largest(&self.e), largest(&self.f), largest(&self.g)]
     }
 
     /// The normals `e x f` in Bernstein form: the values at both ends and twice the middle control vector.
@@ -140,7 +151,7 @@ fn least_gap<const L: usize>(gap0: Lanes<L>, gap1: Lanes<L>, t_max: f64) -> Lane
 pub(super) fn plane_gap<const L: usize>(frame: &Frame<L>, separation: Option<Lanes<L>>, t_max: f64) -> Lanes<L> {
     let n = frame.normals();
     let mut above = frame.cubic_times_three(&n);
-    let mut below = above.map(Lanes::negate);
+    let mut below = [above[0].negate(), above[1].negate(), above[2].negate(), above[3].negate()];
     let [me, mf, mg] = frame.sizes();
     if let Some(separation) = separation {
         // The computed vectors are off by 18 u (36 u the middle one) of the product of sizes, their norms and the sums
@@ -159,7 +170,6 @@ pub(super) fn plane_gap<const L: usize>(frame: &Frame<L>, separation: Option<Lan
         above = up_to(&above, t_max);
         below = up_to(&below, t_max);
     }
-    let least = |b: &[Lanes<L>; 4]| b[0].min(b[1]).min(b[2]).min(b[3]);
     let product = me * mf * mg;
     let gap = least(&above).max(least(&below)) - Lanes::splat(3.0 * CUBIC_ERROR) * product;
     // Sizes whose products leave the range of doubles decide nothing.

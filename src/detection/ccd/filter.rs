@@ -10,12 +10,13 @@
 //! 5. *Integers*: `exact` decides what is left: grazing contact, contact at an end of the step, pairs that stay
 //!    coplanar.
 //!
-//! *Work.* Parts 1 to 3 are bounded by [`MAX_PARTS`] parts and [`MAX_ITERATIONS`] evaluations for each root, part 4 by
+//! *Work.* Parts 1 to 3 are bounded by [`MAX_PARTS`] parts and [`super::roots::MAX_ITERATIONS`] evaluations for each root, part 4 by
 //! [`SEPARATION_INTERVALS`], part 5 as stated there.
 
-use super::coplanarity::{CUBIC_ERROR, Frame, axis_gap, plane_gap};
-use super::exact::{self, AtRoot, Shape};
-use super::motion::{Kind, UNIT_ROUNDOFF};
+use super::coplanarity::{Frame, axis_gap, plane_gap};
+use super::exact::{self, AtRoot, Certain, Shape};
+use super::motion::Kind;
+use super::roots::{Cubic, TIME_TOLERANCE, contact};
 use super::separation;
 use crate::math::simd::Lanes;
 use crate::math::{Vec3, is_finite};
@@ -23,14 +24,8 @@ use crate::math::{Vec3, is_finite};
 /// Parts into which the step is divided at most to isolate the roots of the cubic.
 pub const MAX_PARTS: usize = 32;
 
-/// Evaluations of the cubic per root at most.
-pub const MAX_ITERATIONS: usize = 40;
-
 /// Intervals that the separation test may use before the exact decision.
 pub const SEPARATION_INTERVALS: usize = 64;
-
-/// The reported time may be this much earlier than the exact one.
-const TIME_TOLERANCE: f64 = 1e-6;
 
 /// What floating point can say about a pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,105 +75,26 @@ pub(super) fn single(x: &[Vec3; 4]) -> [[Lanes<1>; 3]; 4] {
     x.map(|p| p.map(|c| Lanes([c])))
 }
 
-/// A cubic in Bernstein form on [0, 1] with the rounding bound of its values.
-struct Cubic {
-    b: [f64; 4],
-    error: f64,
-}
-
-#[inline(always)]
-fn lerp(a: f64, b: f64, t: f64) -> f64 {
-    (1.0 - t) * a + t * b
-}
-
-impl Cubic {
-    /// The blossom: with all arguments t the value, with l's and r's mixed the coefficients on [l, r].
-    #[inline(always)]
-    fn blossom(&self, s: f64, t: f64, u: f64) -> f64 {
-        let b = &self.b;
-        let (p, q, r) = (lerp(b[0], b[1], s), lerp(b[1], b[2], s), lerp(b[2], b[3], s));
-        lerp(lerp(p, q, t), lerp(q, r, t), u)
-    }
-
-    /// Value and derivative.
-    #[inline(always)]
-    fn at(&self, t: f64) -> (f64, f64) {
-        let b = &self.b;
-        let (p, q, r) = (lerp(b[0], b[1], t), lerp(b[1], b[2], t), lerp(b[2], b[3], t));
-        let (v, w) = (lerp(p, q, t), lerp(q, r, t));
-        (lerp(v, w, t), 3.0 * (w - v))
-    }
-
-    fn part(&self, l: f64, r: f64) -> [f64; 4] {
-        [self.blossom(l, l, l), self.blossom(l, l, r), self.blossom(l, r, r), self.blossom(r, r, r)]
-    }
-
-    /// Sign beyond rounding, or 0.
-    #[inline(always)]
-    fn sign(&self, value: f64) -> i32 {
-        i32::from(value > self.error) - i32::from(value < -self.error)
-    }
-
-    /// A bracket around the only root in (l, r), where the signs at both ends are certain and different (`sign_left`
-    /// on the left); the signs at its ends are certain too.
-    fn bracket(&self, l: f64, r: f64, values: (f64, f64), sign_left: i32) -> Option<(f64, f64)> {
-        let (mut low, mut high) = (l, r);
-        let side = f64::from(sign_left);
-        let mut t = (l + (r - l) * (values.0 / (values.0 - values.1))).clamp(l, r);
-        for _ in 0..MAX_ITERATIONS {
-            let (value, slope) = self.at(t);
-            let step = value / slope;
-            if value.abs() <= self.error || step.abs() < UNIT_ROUNDOFF {
-                return self.close_bracket(low, high, t, slope, side);
-            }
-            if value * side > 0.0 {
-                low = t;
-            } else {
-                high = t;
-            }
-            let next = t - step;
-            t = if next > low && next < high { next } else { 0.5 * (low + high) };
-        }
-        None
-    }
-
-    /// Steps outwards from an approximate root until the signs are certain.
-    fn close_bracket(&self, low: f64, high: f64, t: f64, slope: f64, side: f64) -> Option<(f64, f64)> {
-        let mut reach = 2.5 * self.error / slope.abs() + 2.0 * UNIT_ROUNDOFF;
-        for _ in 0..4 {
-            if reach.is_nan() || reach > 0.25 {
-                return None;
-            }
-            let (a, b) = ((t - reach).max(low), (t + reach).min(high));
-            if self.at(a).0 * side > self.error && self.at(b).0 * side < -self.error {
-                return Some((a, b));
-            }
-            reach *= 4.0;
-        }
-        None
-    }
-}
-
 /// Walks the roots of the cubic from the left and tests contact at each.
 fn first_root_inside<const N: usize, K: Kind<N>>(x: (&[Vec3; 4], &[Vec3; 4]), frame: &Frame<1>, t_max: f64) -> Verdict {
-    let sizes = frame.sizes().map(|s| s.0[0]);
-    let product = sizes[0] * sizes[1] * sizes[2];
+    let sizes = frame.sizes();
+    let product = (sizes[0] * sizes[1] * sizes[2]).0[0];
     if !(1e-250..1e250).contains(&product) {
         return Verdict::Open;
     }
-    let c = frame.cubic_times_three(&frame.normals());
-    let cubic = Cubic { b: c.map(|c| c.0[0] * (1.0 / 3.0)), error: CUBIC_ERROR * product };
+    let cubic = Cubic::new(frame, &sizes);
+    let error = cubic.error.0[0];
     // Parts still to be looked at are [left, ends.last()], then on to the one below.
     let mut ends = [t_max; 8];
     let mut count = 1;
     let mut left = 0.0;
     for _ in 0..MAX_PARTS {
         let right = ends[count - 1];
-        let b = if left == 0.0 && right == 1.0 { cubic.b } else { cubic.part(left, right) };
-        let signs = b.map(|b| cubic.sign(b));
+        let b = cubic.part(left, right);
+        let signs = b.map(|b| i32::from(b.0[0] > error) - i32::from(b.0[0] < -error));
         match changes(&signs) {
             Changes::None => {}
-            Changes::One => match test_root(K::SHAPE, x, frame, &cubic, (left, right), (b[0], b[3]), &sizes) {
+            Changes::One => match test_root(K::SHAPE, x, frame, &cubic, (left, right), &b, &sizes) {
                 Verdict::Miss => {}
                 decided => return decided,
             },
@@ -242,63 +158,31 @@ fn test_root(
     shape: Shape,
     (x0, x1): (&[Vec3; 4], &[Vec3; 4]),
     frame: &Frame<1>,
-    cubic: &Cubic,
+    cubic: &Cubic<1>,
     part: (f64, f64),
-    values: (f64, f64),
-    sizes: &[f64; 3],
+    b: &[Lanes<1>; 4],
+    sizes: &[Lanes<1>; 3],
 ) -> Verdict {
-    let sign_left = cubic.sign(values.0);
-    let Some((a, b)) = cubic.bracket(part.0, part.1, values, sign_left) else { return Verdict::Open };
-    match inside(shape, frame, 0.5 * (a + b), 0.5 * (b - a), sizes) {
-        Some(true) if b - a < TIME_TOLERANCE => return Verdict::Hit(a),
-        Some(false) => return Verdict::Miss,
-        _ => {}
+    let bracket = cubic.bracket(part.0, part.1, (b[0], b[3]));
+    if bracket.certain.0[0] <= 0.0 {
+        return Verdict::Open;
     }
-    match exact::at_root(shape, x0, x1, part, (a, b)) {
+    let contact = contact(shape, frame, &bracket, sizes);
+    let ends = (bracket.a.0[0], bracket.b.0[0]);
+    if contact.outside().0[0] > 0.0 {
+        return Verdict::Miss;
+    }
+    if contact.inside().0[0] > 0.0 && ends.1 - ends.0 < TIME_TOLERANCE {
+        return Verdict::Hit(ends.0);
+    }
+    let certain = (contact.normal.0[0] > 0.0).then(|| Certain {
+        axis: contact.axis.0[0] as usize,
+        side: contact.side.0[0] as i32,
+        open: std::array::from_fn(|k| contact.conditions[k].0[0] <= contact.errors[k].0[0]),
+    });
+    match exact::at_root(shape, x0, x1, part, ends, certain) {
         AtRoot::Apart => Verdict::Miss,
         AtRoot::Touching(t) => Verdict::Hit(t),
         AtRoot::Unusable => Verdict::Open,
     }
-}
-
-/// Whether the primitives touch at the root of the cubic within `reach` of t; `None` when rounding or the width of the
-/// bracket leaves it open.
-///
-/// At the root the points are coplanar, so the cross products that hold the barycentric coordinates are multiples of
-/// the normal, and their components along the axis where the normal is largest decide. Such a component is a sum of
-/// two products of components linear in time: rounding is at most 20 u of the product of sizes, and over the bracket
-/// it changes by at most `8 reach` of it.
-fn inside(shape: Shape, frame: &Frame<1>, t: f64, reach: f64, sizes: &[f64; 3]) -> Option<bool> {
-    let at = |v: &[[Lanes<1>; 3]; 2]| -> Vec3 { std::array::from_fn(|c| lerp(v[0][c].0[0], v[1][c].0[0], t)) };
-    let (e, f, g) = (at(&frame.e), at(&frame.f), at(&frame.g));
-    let n = crate::math::cross(e, f);
-    let axis = (1..3).fold(0, |m, c| if n[c].abs() > n[m].abs() { c } else { m });
-    let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
-    let component = |a: &Vec3, b: &Vec3| a[i] * b[j] - a[j] * b[i];
-    let relative = 32.0 * UNIT_ROUNDOFF + 8.0 * reach;
-    let [ef, gf, ge] = [sizes[0] * sizes[1], sizes[2] * sizes[1], sizes[2] * sizes[0]].map(|p| relative * p);
-    if n[axis].abs() <= ef {
-        return None;
-    }
-    let side = if n[axis] > 0.0 { 1.0 } else { -1.0 };
-    let n = n[axis] * side;
-    let u = component(&g, &f) * side;
-    let (conditions, errors) = match shape {
-        Shape::VertexFace => {
-            let v = component(&e, &g) * side;
-            ([u, v, n - u - v, n], [gf, ge, ef + gf + ge, ef])
-        }
-        Shape::EdgeEdge => {
-            let r = component(&g, &e) * side;
-            ([u, n - u, r, n - r], [gf, ef + gf, ge, ef + ge])
-        }
-    };
-    let mut certain = true;
-    for (condition, error) in conditions.iter().zip(errors) {
-        if *condition < -error {
-            return Some(false);
-        }
-        certain &= *condition > error;
-    }
-    certain.then_some(true)
 }

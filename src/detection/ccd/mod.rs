@@ -5,6 +5,7 @@
 //! * `separation`: minimum separation, by certified separating directions
 //! * `filter`: zero separation, floating-point filters with proven bounds in front of the exact decision
 //! * `coplanarity`: the cubic of the four points and the tests that rule contact out, several pairs at once
+//! * `roots`: a root of that cubic and contact at it, several pairs at once
 //! * `exact`: the decision in integers that the filters leave open
 //! * `motion`: a pair in relative coordinates and its separating directions
 
@@ -15,6 +16,7 @@ mod exact;
 pub mod filter;
 mod motion;
 pub mod point_triangle;
+mod roots;
 pub mod separation;
 
 pub use batch::{Hit, Pair, Separation, earliest_time_of_impact, hits};

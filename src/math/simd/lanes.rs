@@ -3,7 +3,7 @@
 //! The operations are the same ones in the same order on every path and there is no fused multiply-add, so a kernel
 //! gives the same bits on every machine.
 
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 /// `N` independent doubles; all operations go lane by lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +50,16 @@ impl<const N: usize> Lanes<N> {
         Lanes(self.0.map(f64::sqrt))
     }
 
+    /// `a` where this is greater than zero, `b` elsewhere, also where it is NaN.
+    #[inline(always)]
+    pub fn if_positive(self, a: Self, b: Self) -> Self {
+        let mut out = b.0;
+        for ((o, c), a) in out.iter_mut().zip(self.0).zip(a.0) {
+            *o = if c > 0.0 { a } else { *o };
+        }
+        Lanes(out)
+    }
+
     /// Negated values.
     #[inline(always)]
     pub fn negate(self) -> Self {
@@ -78,6 +88,14 @@ impl<const N: usize> Mul for Lanes<N> {
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         self.zip(other, |a, b| a * b)
+    }
+}
+
+impl<const N: usize> Div for Lanes<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
     }
 }
 
