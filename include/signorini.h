@@ -147,12 +147,12 @@
 #define SGN_ERROR_BUSY (-17)
 
 /**
- * The world is poisoned by an earlier `SGN_ERROR_PANIC`: it can only be destroyed.
+ * The world is poisoned by an earlier `SGN_ERROR_PANIC`: it can be destroyed, or made sound by loading a snapshot.
  */
 #define SGN_ERROR_POISONED (-18)
 
 /**
- * A snapshot of another kind. Reserved: this version has no snapshots.
+ * Bytes that are no snapshot of this library's format, are damaged, or hold what no world can.
  */
 #define SGN_ERROR_SNAPSHOT_MISMATCH (-19)
 
@@ -187,7 +187,7 @@
 #define SGN_CAPABILITY_DETERMINISTIC 3
 
 /**
- * Version of the snapshot format; 0: none.
+ * Version of the snapshot format that is written and read.
  */
 #define SGN_CAPABILITY_SNAPSHOT_FORMAT 4
 
@@ -1800,6 +1800,21 @@ typedef struct SgnApi {
                                     SgnWitnessAttribute attribute,
                                     const struct SgnViewMut *view,
                                     uint64_t *count);
+  /**
+   * See `sgn_world_snapshot_size`.
+   */
+  SgnResult (*world_snapshot_size)(const struct SgnWorld *world, uint64_t *out);
+  /**
+   * See `sgn_world_snapshot_save`.
+   */
+  SgnResult (*world_snapshot_save)(const struct SgnWorld *world,
+                                   void *buffer,
+                                   uint64_t capacity,
+                                   uint64_t *written);
+  /**
+   * See `sgn_world_snapshot_load`.
+   */
+  SgnResult (*world_snapshot_load)(struct SgnWorld *world, const void *buffer, uint64_t size);
 } SgnApi;
 
 /**
@@ -2225,6 +2240,40 @@ SgnResult sgn_world_pull_witnesses(const struct SgnWorld *world,
                                    SgnWitnessAttribute attribute,
                                    const struct SgnViewMut *view,
                                    uint64_t *count);
+
+/**
+ * Bytes that a snapshot of the world's present state takes.
+ *
+ * Thread: concurrent. Errors: NULL_ARGUMENT, BUSY, POISONED, PANIC.
+ */
+SGN_API SgnResult sgn_world_snapshot_size(const struct SgnWorld *world, uint64_t *out);
+
+/**
+ * Saves everything that the next steps depend on - bodies, materials, systems, filters, what was pushed, what the method
+ * remembers - into `buffer`, and the bytes written into `written` (may be NULL). The bytes depend on no machine.
+ *
+ * Thread: concurrent. Errors: NULL_ARGUMENT, BUFFER_LAYOUT (a `capacity` below `sgn_world_snapshot_size`; nothing is
+ * written, the value at fault is that size), BUSY, POISONED, PANIC.
+ */
+SGN_API
+SgnResult sgn_world_snapshot_save(const struct SgnWorld *world,
+                                  void *buffer,
+                                  uint64_t capacity,
+                                  uint64_t *written);
+
+/**
+ * Makes the world what it was when the snapshot was saved, by this or another world of this or another process. Ids that
+ * were valid then are valid again (another world that was built by the same calls keeps its own ids), ids given out since
+ * are stale. The same calls from there on give the same bits on one build of the library. Works on a poisoned
+ * world, which is sound afterwards. The bytes may come from anywhere: nothing in them is trusted.
+ *
+ * Thread: exclusive. Errors (the world is then as it was): NULL_ARGUMENT, SNAPSHOT_MISMATCH (the index at fault is the
+ * byte), OUT_OF_MEMORY, BUSY, PANIC.
+ */
+SGN_API
+SgnResult sgn_world_snapshot_load(struct SgnWorld *world,
+                                  const void *buffer,
+                                  uint64_t size);
 
 /**
  * Fills `api` with zeros and its size; `size` is `sizeof(SgnApi)`.

@@ -10,7 +10,7 @@ use super::{
     SgnRigidDesc, SgnShapeDesc, SgnSlot, SgnStepDesc, SgnStepReport, SgnSystemDesc, SgnSystemId, SgnVersion, SgnView,
     SgnViewMut, SgnWitnessAttribute, SgnWorld, SgnWorldDesc,
 };
-use std::ffi::c_char;
+use std::ffi::{c_char, c_void};
 
 /// Every function of this header, in one table: a host that loads the library itself needs one symbol, `sgn_get_api`.
 /// Fill with `sgn_api_init`. Functions keep their places; new ones are added at the end.
@@ -170,6 +170,20 @@ pub struct SgnApi {
             count: *mut u64,
         ) -> SgnResult,
     >,
+    /// See `sgn_world_snapshot_size`.
+    pub world_snapshot_size: Option<unsafe extern "C" fn(world: *const SgnWorld, out: *mut u64) -> SgnResult>,
+    /// See `sgn_world_snapshot_save`.
+    pub world_snapshot_save: Option<
+        unsafe extern "C" fn(
+            world: *const SgnWorld,
+            buffer: *mut c_void,
+            capacity: u64,
+            written: *mut u64,
+        ) -> SgnResult,
+    >,
+    /// See `sgn_world_snapshot_load`.
+    pub world_snapshot_load:
+        Option<unsafe extern "C" fn(world: *mut SgnWorld, buffer: *const c_void, size: u64) -> SgnResult>,
 }
 
 // SAFETY: repr(C) without padding; numbers and nullable function pointers.
@@ -255,4 +269,7 @@ const TABLE: SgnApi = SgnApi {
     check_report_init: Some(super::sgn_check_report_init),
     world_check: Some(super::sgn_world_check),
     world_pull_witnesses: Some(super::sgn_world_pull_witnesses),
+    world_snapshot_size: Some(super::sgn_world_snapshot_size),
+    world_snapshot_save: Some(super::sgn_world_snapshot_save),
+    world_snapshot_load: Some(super::sgn_world_snapshot_load),
 };

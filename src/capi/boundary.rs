@@ -65,7 +65,7 @@ fn busy() -> Failure {
 }
 
 fn poisoned() -> Failure {
-    Failure::new(SGN_ERROR_POISONED, "the world is poisoned by an earlier panic: destroy it")
+    Failure::new(SGN_ERROR_POISONED, "the world is poisoned by an earlier panic: destroy it, or load a snapshot")
 }
 
 /// A panic while the guard lives poisons the world, whichever lock it holds.
@@ -101,6 +101,31 @@ pub(super) unsafe fn change(
         }
         let _guard = PoisonOnPanic(handle);
         body(&mut world, &handle.context)
+    })
+}
+
+/// Runs the body of an export that replaces all of a world; one that was poisoned is sound after a success.
+///
+/// # Safety
+/// `world` is NULL or a live world.
+pub(super) unsafe fn replace(
+    world: *mut SgnWorld,
+    function: &str,
+    body: impl FnOnce(&mut World) -> Status,
+) -> SgnResult {
+    // SAFETY: passed on.
+    let Some(handle) = (unsafe { world.as_ref() }) else { return SGN_ERROR_NULL_ARGUMENT };
+    call_in(&handle.context, function, || {
+        let mut world = match handle.world.try_write() {
+            Ok(world) => world,
+            Err(TryLockError::WouldBlock) => return Err(busy()),
+            Err(TryLockError::Poisoned(error)) => error.into_inner(),
+        };
+        let _guard = PoisonOnPanic(handle);
+        let code = body(&mut world)?;
+        handle.world.clear_poison();
+        handle.poisoned.store(false, Ordering::Release);
+        Ok(code)
     })
 }
 
@@ -183,6 +208,16 @@ mod tests {
                 let mut desc = std::mem::zeroed::<SgnMaterialDesc>();
                 assert_eq!(sgn_material_desc_init(&mut desc, size_of::<SgnMaterialDesc>()), SGN_OK);
                 assert_eq!(sgn_material_create(world, &desc, &mut id), SGN_ERROR_POISONED);
+                let mut fresh = std::ptr::null_mut();
+                assert_eq!(sgn_world_create(context, std::ptr::null(), &mut fresh), SGN_OK);
+                let mut room = [0u8; 512];
+                let mut size = 0;
+                assert_eq!(sgn_world_snapshot_save(fresh, room.as_mut_ptr().cast(), 512, &mut size), SGN_OK);
+                assert_eq!(sgn_world_snapshot_load(world, room.as_ptr().cast(), size - 1), SGN_ERROR_SNAPSHOT_MISMATCH);
+                assert_eq!(sgn_world_state_hash(world, &mut hash), SGN_ERROR_POISONED);
+                assert_eq!(sgn_world_snapshot_load(world, room.as_ptr().cast(), size), SGN_OK);
+                assert_eq!(sgn_world_state_hash(world, &mut hash), SGN_OK);
+                assert_eq!(sgn_world_destroy(fresh), SGN_OK);
                 assert_eq!(sgn_world_destroy(world), SGN_OK);
                 assert_eq!(sgn_context_destroy(context), SGN_OK);
             }

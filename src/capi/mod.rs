@@ -6,7 +6,8 @@
 //! * `structs`: structs that grow, by their size
 //! * `views`: strided host memory, read and written element by element
 //! * `version`, `api`: version, capabilities, the table for hosts that load the library themselves
-//! * `context`, `world`, `material`, `description`, `body`, `shape`, `drive`, `system`, `step`, `query`: the functions, by noun
+//! * `context`, `world`, `material`, `description`, `body`, `shape`, `drive`, `system`, `step`, `query`, `snapshot`: the
+//!   functions, by noun
 //!
 //! Every export returns a status, runs behind a panic boundary and writes its outputs only when it succeeds. The
 //! header is generated from these files by `tests/capi`, comments included.
@@ -24,6 +25,7 @@ mod float_environment;
 mod material;
 mod query;
 mod shape;
+mod snapshot;
 mod status;
 mod step;
 mod structs;
@@ -40,6 +42,7 @@ pub use drive::*;
 pub use material::*;
 pub use query::*;
 pub use shape::*;
+pub use snapshot::*;
 pub use status::*;
 pub use step::*;
 pub use system::*;

@@ -54,9 +54,9 @@ pub const SGN_ERROR_BUDGET_EXCEEDED: i32 = -15;
 pub const SGN_ERROR_CANCELLED: i32 = -16;
 /// The world is in use: by a step on another thread, or by the call that this callback comes from.
 pub const SGN_ERROR_BUSY: i32 = -17;
-/// The world is poisoned by an earlier `SGN_ERROR_PANIC`: it can only be destroyed.
+/// The world is poisoned by an earlier `SGN_ERROR_PANIC`: it can be destroyed, or made sound by loading a snapshot.
 pub const SGN_ERROR_POISONED: i32 = -18;
-/// A snapshot of another kind. Reserved: this version has no snapshots.
+/// Bytes that are no snapshot of this library's format, are damaged, or hold what no world can.
 pub const SGN_ERROR_SNAPSHOT_MISMATCH: i32 = -19;
 /// The header and the library do not belong together.
 pub const SGN_ERROR_ABI_MISMATCH: i32 = -20;
@@ -148,6 +148,7 @@ impl From<WorldError> for Failure {
             Fault::Pinched => SGN_ERROR_PINCHED,
             Fault::OutOfMemory => SGN_ERROR_OUT_OF_MEMORY,
             Fault::Cancelled => SGN_ERROR_CANCELLED,
+            Fault::SnapshotMismatch => SGN_ERROR_SNAPSHOT_MISMATCH,
             Fault::Unsupported => SGN_ERROR_UNSUPPORTED,
         };
         Failure { code, object: error.object, index: error.index, value: error.value, message: error.message }

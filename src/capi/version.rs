@@ -45,7 +45,7 @@ pub const SGN_CAPABILITY_EXECUTORS: i32 = 1;
 pub const SGN_CAPABILITY_METHODS: i32 = 2;
 /// 1: the same inputs give the same bits on any executor.
 pub const SGN_CAPABILITY_DETERMINISTIC: i32 = 3;
-/// Version of the snapshot format; 0: none.
+/// Version of the snapshot format that is written and read.
 pub const SGN_CAPABILITY_SNAPSHOT_FORMAT: i32 = 4;
 /// Most workers of a pool.
 pub const SGN_CAPABILITY_WORKERS_MAX: i32 = 5;
@@ -91,7 +91,7 @@ pub unsafe extern "C" fn sgn_query(capability: SgnCapability, out: *mut i64) -> 
             SGN_CAPABILITY_EXECUTORS => (1 << SGN_EXECUTOR_SERIAL) | (1 << SGN_EXECUTOR_POOL),
             SGN_CAPABILITY_METHODS => 1 << SGN_METHOD_IMPLICIT,
             SGN_CAPABILITY_DETERMINISTIC => 1,
-            SGN_CAPABILITY_SNAPSHOT_FORMAT => 0,
+            SGN_CAPABILITY_SNAPSHOT_FORMAT => i64::from(crate::world::SNAPSHOT_FORMAT),
             SGN_CAPABILITY_WORKERS_MAX => 1024,
             _ => return Err(Failure::new(SGN_ERROR_UNSUPPORTED, "unknown capability")),
         };

@@ -105,6 +105,7 @@ pub(super) struct Certified {
 /// A body as the world keeps it.
 pub(super) struct Body {
     pub description: BodyDescription,
+    /// Key of the material; 0: none.
     pub material: u64,
     pub user_key: u64,
     /// Start positions of the next step; world positions for every kind.
@@ -169,7 +170,7 @@ impl Body {
         };
         Body {
             description,
-            material: options.material,
+            material: 0,
             user_key: options.user_key,
             positions: Vec::new(),
             pose: Pose::IDENTITY,
@@ -208,7 +209,7 @@ impl World {
         let mut body = Body::new(&options, Kind::Deformable { masses, pinned }, surface);
         body.velocities = vec![ZERO; count];
         body.positions = positions;
-        self.insert(body)
+        self.insert(&options, body)
     }
 
     /// Adds a rigid body. Errors as for a deformable one.
@@ -233,7 +234,7 @@ impl World {
         let surface = surface(vertices, topology)?;
         let mut body = Body::new(&options, Kind::Rigid { mass, inertia }, surface);
         body.velocities = vec![description.velocity, description.angular_velocity];
-        self.insert_posed(body, pose)
+        self.insert_posed(&options, body, pose)
     }
 
     /// Adds a kinematic body. Errors as for a deformable one.
@@ -242,37 +243,35 @@ impl World {
         if let Some(pose) = pose {
             let pose = checked_pose(pose, options.precision)?;
             let surface = surface(vertices, topology)?;
-            return self.insert_posed(Body::new(&options, Kind::Kinematic { posed: true }, surface), pose);
+            return self.insert_posed(&options, Body::new(&options, Kind::Kinematic { posed: true }, surface), pose);
         }
         let rest = vertices.clone();
         round_all(&mut vertices, options.precision, "start position")?;
         let mut body = Body::new(&options, Kind::Kinematic { posed: false }, surface(rest, topology)?);
         body.positions = vertices;
-        self.insert(body)
+        self.insert(&options, body)
     }
 
     /// Adds a half-space. Errors: a normal without direction, values that are not finite.
     pub fn add_half_space(&mut self, options: BodyOptions, plane: HalfSpace) -> Result<u64, WorldError> {
         let plane = checked_half_space(plane)?;
-        self.insert(Body::new(&options, Kind::HalfSpace(plane), Surface::default()))
+        self.insert(&options, Body::new(&options, Kind::HalfSpace(plane), Surface::default()))
     }
 
-    fn insert_posed(&mut self, mut body: Body, pose: Pose) -> Result<u64, WorldError> {
+    fn insert_posed(&mut self, options: &BodyOptions, mut body: Body, pose: Pose) -> Result<u64, WorldError> {
         body.positions = body.posed_vertices(&pose)?;
         body.pose = pose;
-        self.insert(body)
+        self.insert(options, body)
     }
 
-    fn insert(&mut self, mut body: Body) -> Result<u64, WorldError> {
+    fn insert(&mut self, options: &BodyOptions, mut body: Body) -> Result<u64, WorldError> {
         if let Some(half_thickness) = body.description.half_thickness
             && !(half_thickness >= 0.0 && half_thickness.is_finite())
         {
             let fault = if half_thickness.is_nan() { Fault::NonFinite } else { Fault::InvalidArgument };
             return Err(WorldError::new(fault, "the half thickness is finite and not negative").value(half_thickness));
         }
-        if body.material != 0 {
-            self.materials.get(body.material)?;
-        }
+        body.material = self.materials.key_of(options.material)?;
         let id = self.bodies.insert_with(|id| {
             body.description.key = ids::key(id);
             Ok(body)
@@ -284,8 +283,12 @@ impl World {
     /// Removes a body, and the systems that name it.
     pub fn remove_body(&mut self, id: u64) -> Result<(), WorldError> {
         self.bodies.remove(id)?;
-        let named: Vec<u64> =
-            self.systems.iter().filter(|(_, system)| system.bodies.contains(&id)).map(|(system, _)| system).collect();
+        let named: Vec<u64> = self
+            .systems
+            .iter()
+            .filter(|(_, system)| system.bodies.contains(&ids::key(id)))
+            .map(|(system, _)| system)
+            .collect();
         for system in named {
             self.systems.remove(system)?;
         }
@@ -304,9 +307,7 @@ impl World {
 
     /// Sets the material of a body; 0: frictionless.
     pub fn set_material(&mut self, id: u64, material: u64) -> Result<(), WorldError> {
-        if material != 0 {
-            self.materials.get(material)?;
-        }
+        let material = self.materials.key_of(material)?;
         self.bodies.get_mut(id)?.material = material;
         self.model_current = false;
         Ok(())
@@ -388,7 +389,7 @@ pub(super) fn checked_half_space(plane: HalfSpace) -> Result<HalfSpace, WorldErr
 
 /// The inertia with its rounding asymmetry removed. Errors: not finite, not symmetric to a millionth of its largest
 /// entry, not positive definite.
-fn symmetric(m: Mat3) -> Result<Mat3, WorldError> {
+pub(super) fn symmetric(m: Mat3) -> Result<Mat3, WorldError> {
     if m.iter().any(|row| !is_finite(*row)) {
         return Err(WorldError::new(Fault::NonFinite, "the inertia is not finite"));
     }

@@ -25,6 +25,8 @@ pub enum Fault {
     OutOfMemory,
     /// Cancelled by the host.
     Cancelled,
+    /// Bytes that are no snapshot of this format, or hold what no world can.
+    SnapshotMismatch,
     /// Not offered for this kind of body.
     Unsupported,
 }

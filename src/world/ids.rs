@@ -26,7 +26,10 @@ pub(super) fn new_world_tag() -> u16 {
 const KEY_MASK: u64 = 0xffff_ffff_ffff;
 
 struct Slot<T> {
+    /// Generation of the value, or of the one that was removed last.
     generation: u16,
+    /// The highest generation ever given out. Above `generation` only after an older table was restored.
+    given: u16,
     value: Option<T>,
 }
 
@@ -46,9 +49,10 @@ impl<T> Slots<T> {
     /// Stores what `make` returns for the new id.
     pub(super) fn insert_with(&mut self, make: impl FnOnce(u64) -> Result<T, WorldError>) -> Result<u64, WorldError> {
         if let Some(&index) = self.free.last() {
-            let generation = self.entries[index as usize].generation;
+            let generation = self.entries[index as usize].given + 1;
             let id = self.id(index, generation);
-            self.entries[index as usize].value = Some(make(id)?);
+            let value = Some(make(id)?);
+            self.entries[index as usize] = Slot { generation, given: generation, value };
             self.free.pop();
             return Ok(id);
         }
@@ -58,7 +62,7 @@ impl<T> Slots<T> {
         }
         let id = self.id(index as u32, 1);
         let value = Some(make(id)?);
-        self.entries.push(Slot { generation: 1, value });
+        self.entries.push(Slot { generation: 1, given: 1, value });
         Ok(id)
     }
 
@@ -80,7 +84,7 @@ impl<T> Slots<T> {
             return Err(WorldError::new(Fault::InvalidId, what).object(id));
         }
         let slot = &self.entries[index - 1];
-        if generation > slot.generation && slot.generation != 0 {
+        if generation > slot.given {
             return Err(WorldError::new(Fault::InvalidId, "the id was never given out").object(id));
         }
         if generation != slot.generation || slot.value.is_none() {
@@ -112,11 +116,64 @@ impl<T> Slots<T> {
         }
         let entry = &mut self.entries[slot];
         entry.value = None;
-        entry.generation = entry.generation.wrapping_add(1);
-        if entry.generation != 0 {
+        if entry.given < u16::MAX {
             self.free.push(slot as u32);
         }
         Ok(())
+    }
+
+    /// The table without its values: generation of each slot and whether it is in use, and the free slots in order.
+    pub(super) fn table(&self) -> (Vec<(u16, bool)>, Vec<u32>) {
+        let used = |slot: &Slot<T>| (slot.generation, slot.value.is_some());
+        (self.entries.iter().map(used).collect(), self.free.clone())
+    }
+
+    /// A table with the slots and values of a snapshot and the tag of this one. Ids that are valid in the snapshot are
+    /// valid in it; ids that this table gave out since are stale, and are not given out again.
+    ///
+    /// Errors, as a message: slots that do not fit together.
+    pub(super) fn restored(
+        &self,
+        slots: &[(u16, bool)],
+        free: &[u32],
+        values: impl IntoIterator<Item = T>,
+    ) -> Result<Slots<T>, &'static str> {
+        let count = slots.len().max(self.entries.len());
+        let mut entries = Vec::new();
+        let mut all_free: Vec<u32> = Vec::new();
+        if entries.try_reserve(count).is_err() || all_free.try_reserve(count).is_err() {
+            return Err("no memory for the table of ids");
+        }
+        let mut values = values.into_iter();
+        for index in 0..count {
+            let (generation, used) = slots.get(index).copied().unwrap_or((0, false));
+            let value = if used { Some(values.next().ok_or("fewer values than slots in use")?) } else { None };
+            if index < slots.len() && generation == 0 {
+                return Err("a slot has the generation 0");
+            }
+            let given = self.entries.get(index).map_or(0, |now| now.given).max(generation);
+            entries.push(Slot { generation, given, value });
+        }
+        if values.next().is_some() {
+            return Err("more values than slots in use");
+        }
+        // Slots that the snapshot does not know come below its own: they are used again last.
+        all_free.extend((slots.len()..count).rev().map(|index| index as u32));
+        all_free.extend(free);
+        let mut seen = vec![false; count];
+        for index in &all_free {
+            let slot = entries.get(*index as usize).ok_or("a free slot is out of range")?;
+            if slot.value.is_some() || std::mem::replace(&mut seen[*index as usize], true) {
+                return Err("a free slot is in use, or free twice");
+            }
+        }
+        all_free.retain(|index| entries[*index as usize].given < u16::MAX);
+        Ok(Slots { prefix: self.prefix, entries, free: all_free })
+    }
+
+    /// The key of an id that is in use; null stays null. Errors: those of a look-up.
+    pub(super) fn key_of(&self, id: u64) -> Result<u64, WorldError> {
+        if id == 0 { Ok(0) } else { self.slot(id).map(|_| key(id)) }
     }
 
     /// Ids and values in the order of slots.

@@ -1,6 +1,6 @@
 //! Materials of a world.
 
-use super::{Fault, World, WorldError};
+use super::{Fault, World, WorldError, ids};
 use crate::model::{CombineRule, Material, Materials};
 
 /// What bodies without a material have: no friction against anything.
@@ -38,11 +38,7 @@ impl World {
     /// 0 stands for the material of bodies without one.
     pub fn set_pair_friction(&mut self, a: u64, b: u64, friction: f64) -> Result<(), WorldError> {
         checked_friction(friction)?;
-        for id in [a, b] {
-            if id != 0 {
-                self.materials.get(id)?;
-            }
-        }
+        let (a, b) = (self.materials.key_of(a)?, self.materials.key_of(b)?);
         let pair = (a.min(b), a.max(b));
         match self.overrides.binary_search_by(|o| (o.0, o.1).cmp(&pair)) {
             Ok(found) => self.overrides[found].2 = friction,
@@ -52,15 +48,16 @@ impl World {
         Ok(())
     }
 
-    /// The model's materials; index 0 is that of bodies without one, then those of the world in the order of slots.
+    /// The model's materials and their keys; index 0 is that of bodies without one, then those of the world in the order
+    /// of slots.
     pub(super) fn model_materials(&self) -> (Materials, Vec<u64>) {
-        let mut ids = vec![0];
+        let mut keys = vec![0];
         let mut list = vec![FRICTIONLESS];
         for (id, material) in self.materials.iter() {
-            ids.push(id);
+            keys.push(ids::key(id));
             list.push(*material);
         }
-        let place = |id: u64| ids.iter().position(|known| *known == id).map(|place| place as u32);
+        let place = |key: u64| keys.iter().position(|known| *known == key).map(|place| place as u32);
         let mut overrides: Vec<(u32, u32, f64)> = Vec::new();
         for (a, b, friction) in &self.overrides {
             if let (Some(a), Some(b)) = (place(*a), place(*b)) {
@@ -68,6 +65,6 @@ impl World {
             }
         }
         overrides.sort_by_key(|pair| (pair.0, pair.1));
-        (Materials { list, overrides }, ids)
+        (Materials { list, overrides }, keys)
     }
 }

@@ -8,14 +8,18 @@
 //! * `system`: host matrices
 //! * `drive`: what is pushed before a step
 //! * `step`: the step
-//! * `query`: what is pulled after it; check, hash
+//! * `query`: what is pulled after it; check
+//! * `archive`: values as bytes
+//! * `snapshot`: the whole world as bytes, and its hash
 
+mod archive;
 mod body;
 mod drive;
 mod error;
 mod ids;
 mod material;
 mod query;
+mod snapshot;
 mod step;
 mod surface;
 mod system;
@@ -23,6 +27,7 @@ mod system;
 pub use body::{BodyOptions, DeformableDescription, KinematicDescription, RigidDescription};
 pub use error::{Fault, WorldError};
 pub use query::{BodyInfo, BodyKind, Outcome};
+pub use snapshot::SNAPSHOT_FORMAT;
 pub use step::StepFailure;
 pub use surface::Topology;
 pub use system::SymmetrySlack;

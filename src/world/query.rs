@@ -151,38 +151,6 @@ impl World {
     pub fn id_of_key(&self, key: u64) -> u64 {
         self.bodies.id_of_key(key)
     }
-
-    /// A 64-bit hash over everything that the host has pushed and the last step has left; equal bits, equal hash.
-    /// Ids enter without the world's tag, so that two worlds with the same history have the same hash. Cost: linear.
-    pub fn state_hash(&self) -> u64 {
-        let mut hash = Hash::new();
-        for (id, body) in self.bodies.iter() {
-            hash.word(super::ids::key(id));
-            body.hash(&mut hash);
-        }
-        for (id, material) in self.materials.iter() {
-            hash.word(super::ids::key(id));
-            hash.number(material.friction_coefficient);
-            hash.word(material.combine_rule as u64);
-        }
-        for (a, b, friction) in &self.overrides {
-            hash.word(super::ids::key(*a));
-            hash.word(super::ids::key(*b));
-            hash.number(*friction);
-        }
-        for (id, system) in self.systems.iter() {
-            hash.word(super::ids::key(id));
-            system.bodies.iter().for_each(|body| hash.word(super::ids::key(*body)));
-            system.columns.iter().for_each(|column| hash.word(u64::from(*column)));
-            system.values.iter().flatten().for_each(|row| hash.vector(*row));
-        }
-        for contact in &self.contacts {
-            hash.word(contact.key);
-            hash.number(contact.distance);
-            hash.vector(contact.impulse);
-        }
-        hash.value
-    }
 }
 
 impl Body {
@@ -193,94 +161,8 @@ impl Body {
             Outcome::Impulse => &self.result_impulses,
         }
     }
-
-    fn hash(&self, hash: &mut Hash) {
-        let d = &self.description;
-        for word in [d.groups, d.mask, d.self_collision as u64, d.precision as u64, super::ids::key(self.material)] {
-            hash.word(word);
-        }
-        hash.number(d.half_thickness.unwrap_or(-1.0));
-        match &d.kind {
-            Kind::Deformable { masses, pinned } => {
-                masses.iter().for_each(|mass| hash.number(*mass));
-                pinned.iter().for_each(|pinned| hash.word(u64::from(*pinned)));
-            }
-            Kind::Rigid { mass, inertia } => {
-                hash.number(*mass);
-                inertia.iter().for_each(|row| hash.vector(*row));
-            }
-            Kind::Kinematic { posed } => hash.word(u64::from(*posed)),
-            Kind::HalfSpace(_) => hash.half_space(&self.half_space),
-        }
-        let certified = self.certified.as_ref();
-        for list in [
-            &self.positions,
-            &self.velocities,
-            &self.result_velocities,
-            &self.result_end_velocities,
-            &self.result_impulses,
-        ] {
-            hash.vectors(list);
-        }
-        hash.pose(&self.pose);
-        hash.word(u64::from(self.stepped));
-        hash.word(u64::from(certified.is_some()));
-        if let Some(certified) = certified {
-            hash.vectors(&certified.positions);
-            hash.pose(&certified.pose);
-            hash.half_space(&certified.half_space);
-        }
-        if let Some(targets) = &self.target_positions {
-            hash.vectors(targets);
-        }
-        if let Some(pose) = &self.target_pose {
-            hash.pose(pose);
-        }
-        if let Some(plane) = &self.target_half_space {
-            hash.half_space(plane);
-        }
-    }
 }
 
 fn without(what: &str, id: u64) -> WorldError {
     WorldError::new(Fault::Unsupported, format!("this kind of body has no {what}")).object(id)
-}
-
-/// A multiply-and-rotate hash over 64-bit words. Not for adversaries.
-struct Hash {
-    value: u64,
-}
-
-impl Hash {
-    fn new() -> Hash {
-        Hash { value: 0x243f_6a88_85a3_08d3 }
-    }
-
-    fn word(&mut self, word: u64) {
-        self.value = (self.value ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        self.value ^= self.value >> 29;
-    }
-
-    fn number(&mut self, x: f64) {
-        self.word(x.to_bits());
-    }
-
-    fn vector(&mut self, v: Vec3) {
-        v.iter().for_each(|x| self.number(*x));
-    }
-
-    fn vectors(&mut self, list: &[Vec3]) {
-        self.word(list.len() as u64);
-        list.iter().for_each(|v| self.vector(*v));
-    }
-
-    fn pose(&mut self, pose: &Pose) {
-        self.vector(pose.position);
-        pose.orientation.iter().for_each(|x| self.number(*x));
-    }
-
-    fn half_space(&mut self, plane: &HalfSpace) {
-        self.vector(plane.normal);
-        self.number(plane.offset);
-    }
 }

@@ -71,9 +71,9 @@ impl World {
         if self.model_current {
             return Ok(());
         }
-        let (materials, material_ids) = self.model_materials();
+        let (materials, material_keys) = self.model_materials();
         let describe = |body: &Body| {
-            let material = material_ids.iter().position(|id| *id == body.material).unwrap_or(0) as u32;
+            let material = material_keys.iter().position(|key| *key == body.material).unwrap_or(0) as u32;
             BodyDescription { material, ..body.description.clone() }
         };
         let bodies = self.bodies.iter().map(|(_, body)| describe(body)).collect();

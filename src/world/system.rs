@@ -6,6 +6,7 @@ use crate::model::{Kind, SystemDescription};
 
 /// A system as the world keeps it.
 pub(super) struct HostSystem {
+    /// Keys of the bodies.
     pub bodies: Vec<u64>,
     pub row_offsets: Vec<usize>,
     pub columns: Vec<u32>,
@@ -42,8 +43,7 @@ impl World {
                 let message = "a system is over deformable and rigid bodies only";
                 return Err(WorldError::new(Fault::InvalidArgument, message).object(*id).index(index));
             }
-            let other = self.systems.iter().any(|(_, system)| system.bodies.contains(id));
-            if other || bodies[..index].contains(id) {
+            if self.in_system(ids::key(*id), None) || bodies[..index].contains(id) {
                 let message = "a body is named by two systems, or twice by one";
                 return Err(WorldError::new(Fault::InvalidArgument, message).object(*id).index(index));
             }
@@ -53,10 +53,16 @@ impl World {
             return Err(WorldError::new(Fault::InvalidArgument, "a system needs at least one body"));
         }
         check_pattern(rows, &row_offsets, &columns, upper)?;
+        let bodies = bodies.into_iter().map(ids::key).collect();
         let system = HostSystem { bodies, row_offsets, columns, upper, values: Vec::new() };
         let id = self.systems.insert_with(|_| Ok(system))?;
         self.model_current = false;
         Ok(id)
+    }
+
+    /// Whether a system, other than `except`, names the body with this key.
+    pub(super) fn in_system(&self, body: u64, except: Option<u64>) -> bool {
+        self.systems.iter().any(|(id, system)| Some(id) != except && system.bodies.contains(&body))
     }
 
     /// Number of blocks of a system's pattern.
@@ -92,7 +98,7 @@ impl World {
     /// Patterns by model keys, in the order of slots.
     pub(super) fn model_systems(&self) -> Vec<SystemDescription> {
         let describe = |system: &HostSystem| SystemDescription {
-            bodies: system.bodies.iter().map(|id| ids::key(*id)).collect(),
+            bodies: system.bodies.clone(),
             row_offsets: system.row_offsets.clone(),
             columns: system.columns.clone(),
             upper: system.upper,
@@ -105,7 +111,7 @@ fn bad(message: String, index: usize, value: f64) -> WorldError {
     WorldError::new(Fault::InvalidArgument, message).index(index).value(value)
 }
 
-fn check_pattern(rows: usize, offsets: &[usize], columns: &[u32], upper: bool) -> Result<(), WorldError> {
+pub(super) fn check_pattern(rows: usize, offsets: &[usize], columns: &[u32], upper: bool) -> Result<(), WorldError> {
     if offsets.len() != rows + 1 {
         let message = format!("{} row offsets for {rows} block rows, {} needed", offsets.len(), rows + 1);
         return Err(WorldError::new(Fault::BufferLayout, message).value(offsets.len() as f64));
@@ -161,7 +167,7 @@ fn find(offsets: &[usize], columns: &[u32], row: usize, column: usize) -> Option
 
 /// Checks diagonal entries and symmetry, and replaces the two values of a pair by their mean, so that what the solver
 /// gets is symmetric to the last bit.
-fn symmetrise(system: &HostSystem, values: &mut [Mat3], slack: SymmetrySlack) -> Result<(), WorldError> {
+pub(super) fn symmetrise(system: &HostSystem, values: &mut [Mat3], slack: SymmetrySlack) -> Result<(), WorldError> {
     let slack = match slack {
         SymmetrySlack::Single => 1e-5,
         SymmetrySlack::Double => 1e-10,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// Files of `src/capi` in the order of the header.
-const SOURCES: [&str; 13] = [
+const SOURCES: [&str; 14] = [
     "status",
     "version",
     "views",
@@ -17,6 +17,7 @@ const SOURCES: [&str; 13] = [
     "system",
     "step",
     "query",
+    "snapshot",
 ];
 
 fn root() -> &'static Path {
@@ -86,6 +87,13 @@ fn the_header_is_generated_from_the_sources() {
     bless_or_compare("include/signorini.h", &header);
     let names = functions(&header);
     assert!(names.len() > 40, "{names:?}");
+    for entry in std::fs::read_dir(root().join("src/capi")).expect("src/capi") {
+        let text = std::fs::read_to_string(entry.expect("an entry").path()).expect("a source");
+        for export in text.split("pub unsafe extern \"C\" fn ").skip(1) {
+            let name = &export[..export.find('(').expect("its arguments")];
+            assert!(names.iter().any(|known| known == name), "{name} is exported and not in the header");
+        }
+    }
     bless_or_compare("include/signorini.symbols", &(names.join("\n") + "\n"));
 }
 

@@ -1,6 +1,7 @@
 //! Same inputs, same bits: for any number of threads, with and without scratch kept from earlier steps.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod snapshot;
 #[allow(dead_code, unused_imports)]
 #[path = "../../benches/support/mod.rs"]
 mod support;

@@ -1,5 +1,5 @@
-/* The same history gives the same hash: serial, with 1, 2, 3 and 5 workers, and when the host flushes denormals to zero;
- * the host's floating-point environment is as it was. */
+/* The same history gives the same hash: serial, with 1, 2, 3 and 5 workers, when the host flushes denormals to zero, and
+ * when the world is replaced half-way by its snapshot; the host's floating-point environment is as it was. */
 #include "check.h"
 #if defined(__x86_64__)
 #include <xmmintrin.h>
@@ -27,7 +27,34 @@ static void leave_host(void) {
 #endif
 }
 
-static uint64_t history(int workers) {
+static void save_and_load(SgnWorld *world) {
+  uint64_t size = 0, written = 0, hash = state_hash(world);
+  unsigned char *room;
+  SgnBodyId later = {0};
+  SgnHalfSpaceDesc plane;
+  OK(sgn_world_snapshot_size(world, &size));
+  room = malloc(size);
+  CHECK(room != NULL);
+  if (!room) return;
+  GIVES(SGN_ERROR_BUFFER_LAYOUT, sgn_world_snapshot_save(world, room, size - 1, &written));
+  CHECK(written == 0);
+  OK(sgn_world_snapshot_save(world, room, size, &written));
+  CHECK(written == size);
+  OK(sgn_half_space_desc_init(&plane, sizeof plane));
+  plane.offset = -100;
+  OK(sgn_half_space_create(world, &plane, &later));
+  CHECK(state_hash(world) != hash);
+  room[size / 2] ^= 1;
+  GIVES(SGN_ERROR_SNAPSHOT_MISMATCH, sgn_world_snapshot_load(world, room, size));
+  room[size / 2] ^= 1;
+  GIVES(SGN_ERROR_SNAPSHOT_MISMATCH, sgn_world_snapshot_load(world, room, size - 1));
+  OK(sgn_world_snapshot_load(world, room, size));
+  CHECK(state_hash(world) == hash);
+  GIVES(SGN_ERROR_STALE_ID, sgn_body_destroy(world, later));
+  free(room);
+}
+
+static uint64_t history(int workers, int snapshot_frame) {
   SgnContext *context = NULL;
   SgnContextDesc desc;
   SgnWorld *world = NULL;
@@ -88,6 +115,7 @@ static uint64_t history(int workers) {
     CHECK(sgn_world_step(world, &step, NULL) >= 0);
     OK(sgn_body_pull(world, cloth_id, SGN_SLOT_VELOCITY, &pull));
     leave_host();
+    if (frame == snapshot_frame) save_and_load(world);
   }
   hash = state_hash(world);
   {
@@ -102,15 +130,16 @@ static uint64_t history(int workers) {
 }
 
 int main(void) {
-  uint64_t wanted = history(0);
-  for (int workers = 1; workers <= 5; workers += workers == 3 ? 2 : 1) CHECK(history(workers) == wanted);
+  uint64_t wanted = history(0, -1);
+  for (int workers = 1; workers <= 5; workers += workers == 3 ? 2 : 1) CHECK(history(workers, -1) == wanted);
+  CHECK(history(0, 3) == wanted);
 #if defined(__x86_64__)
   /* Flush to zero with denormals as zero; rounding down; both with rounding up. */
   const unsigned int hosts[3] = {0x1f80u | 0x8040u, 0x1f80u | 0x2000u, 0x1f80u | 0x8040u | 0x4000u};
   for (int i = 0; i < 3; i++) {
     host_csr = hosts[i];
-    CHECK(history(0) == wanted);
-    CHECK(history(3) == wanted);
+    CHECK(history(0, -1) == wanted);
+    CHECK(history(3, 2) == wanted);
   }
 #endif
   return finish();

@@ -94,6 +94,7 @@ static void null_pointers(void) {
   SgnVersion version;
   SgnWorldDesc world_desc;
   SgnBodyId body = {77};
+  unsigned char room[64] = {0};
   SgnMaterialId material_id = {77};
   SgnSystemId system_id = {77};
   SgnApi api;
@@ -132,6 +133,15 @@ static void null_pointers(void) {
   NULLED(sgn_world_create(f.context, NULL, NULL));
   NULLED(sgn_world_state_hash(NULL, &number));
   NULLED(sgn_world_state_hash(f.world, NULL));
+  NULLED(sgn_world_snapshot_size(NULL, &number));
+  NULLED(sgn_world_snapshot_size(f.world, NULL));
+  NULLED(sgn_world_snapshot_save(NULL, room, sizeof room, &number));
+  NULLED(sgn_world_snapshot_save(f.world, NULL, sizeof room, &number));
+  NULLED(sgn_world_snapshot_load(NULL, room, sizeof room));
+  NULLED(sgn_world_snapshot_load(f.world, NULL, sizeof room));
+  GIVES(SGN_ERROR_SNAPSHOT_MISMATCH, sgn_world_snapshot_load(f.world, room, sizeof room));
+  GIVES(SGN_ERROR_SNAPSHOT_MISMATCH, sgn_world_snapshot_load(f.world, room, 0));
+  GIVES(SGN_ERROR_BUFFER_LAYOUT, sgn_world_snapshot_load(f.world, room, UINT64_MAX));
   OK(sgn_material_desc_init(&material, sizeof material));
   NULLED(sgn_material_create(NULL, &material, &material_id));
   NULLED(sgn_material_create(f.world, NULL, &material_id));
