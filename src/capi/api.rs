@@ -189,7 +189,7 @@ pub struct SgnApi {
 // SAFETY: repr(C) without padding; numbers and nullable function pointers.
 unsafe impl Growing for SgnApi {
     const NAME: &'static str = "SgnApi";
-    const FIRST_SIZE: usize = 360;
+    const FIRST_SIZE: usize = 384;
     fn defaults() -> Self {
         // SAFETY: all zero is a valid table of no functions.
         unsafe { std::mem::zeroed() }
