@@ -3,7 +3,7 @@
 use crate::world::*;
 use signorini::contact_search::{
     BodyFilter, CandidateSearch, Contact, Pair, PairKind, Passing, gather, minimum_separation, near_contacts,
-    swept_hits,
+    swept_free, swept_hits,
 };
 use signorini::math::{Vec3, add, lerp, norm, sub};
 use signorini::model::{Model, State};
@@ -85,7 +85,15 @@ fn every_near_pair_is_covered_by_a_contact_and_every_contact_is_near() {
             near += 1;
             let own = stencil(vertices, closest.weights);
             let cover = mesh.iter().find(|c| same(&own, &stencil(c.vertices, c.weights)));
-            let cover = cover.unwrap_or_else(|| panic!("seed {seed}: {pair:?} is near and has no contact"));
+            // Closest points on a border may slide off into a face that is nearer and has its own row.
+            let nearer = mesh.iter().any(|c| {
+                let known = |v: &(u32, f64)| c.vertices.contains(&v.0);
+                own.iter().all(known) && c.start_gap < closest.distance_squared.sqrt()
+            });
+            let Some(cover) = cover else {
+                assert!(own.len() < 4 && nearer, "seed {seed}: {pair:?} is near and has no contact");
+                continue;
+            };
             assert!((cover.start_gap - closest.distance_squared.sqrt()).abs() < 1e-12);
             assert!(cover.thickness >= thickness);
         }
@@ -102,6 +110,61 @@ fn every_near_pair_is_covered_by_a_contact_and_every_contact_is_near() {
         assert_eq!(contacts.len() - mesh.len(), below.count());
     }
     assert!(total > 30, "{total} near pairs");
+}
+
+/// Contacts of a triangle that stands on its tip over a sheet of 3 x 3 vertices, 0.2 apart.
+fn contacts_of_a_tip_at(x: f64, y: f64) -> Vec<Contact> {
+    let mut plan = Plan::rubbing(0.3);
+    let cloth = sheet(3, 0.4);
+    plan.cloth(&cloth, cloth.positions.clone(), 0.1, &[], [0.0; 3]);
+    let standing = crate::support::shapes::Triangles {
+        positions: vec![[x, y, HALF_THICKNESS], [x + 0.05, y, 0.3], [x, y + 0.05, 0.3]],
+        faces: vec![[0, 1, 2]],
+    };
+    plan.cloth(&standing, standing.positions.clone(), 0.1, &[], [0.0; 3]);
+    let world = plan.build();
+    let filter = BodyFilter::new(&world.model);
+    let mut search = CandidateSearch::default();
+    let x0 = &world.state.positions;
+    let candidates = search.update(&world.model, &filter, x0, x0, 1.0, Par::Serial);
+    let (start, passing) = (&world.state, Passing::default());
+    near_contacts(&world.model, &filter, &passing, candidates, start, start, 1.0, Par::Serial)
+}
+
+#[test]
+fn a_tip_has_one_contact_wherever_it_stands() {
+    // Inside a face, by an edge, over an edge, over a vertex, over a corner and a border of the sheet.
+    let places = [(0.03, 0.07), (0.1, 1e-4), (0.1, 0.0), (0.0, 0.0), (-0.2, -0.2), (0.05, 0.2), (0.1, 0.1)];
+    for (x, y) in places {
+        let contacts = contacts_of_a_tip_at(x, y);
+        assert_eq!(contacts.len(), 1, "at {x} {y}: {contacts:?}");
+        assert!((contacts[0].start_gap - HALF_THICKNESS).abs() < 1e-15);
+        assert!(norm(sub(contacts[0].normal.map(f64::abs), [0.0, 0.0, 1.0])) < 1e-12);
+    }
+}
+
+#[test]
+fn detection_keeps_half_of_the_smaller_of_thickness_and_start_distance() {
+    let delta = 2.0 * HALF_THICKNESS;
+    for (distance, kept) in [(3.0 * delta, 0.5 * delta), (delta, 0.5 * delta), (0.4 * delta, 0.2 * delta)] {
+        let mut plan = Plan::rubbing(0.3);
+        let cloth = sheet(3, 0.4);
+        for z in [0.0, distance] {
+            plan.cloth(&cloth, moved(&cloth, [0.3 * z, 0.2 * z, z], &mut Jitter(0), 0.0), 0.1, &[], [0.0; 3]);
+        }
+        plan.half_space([0.0, 0.0, 1.0], -distance);
+        let world = plan.build();
+        let filter = BodyFilter::new(&world.model);
+        for (share, hit) in [(0.98, true), (1.02, false)] {
+            // The upper sheet comes down on the lower, the lower on the half-space.
+            for sheet in [0..9, 9..18] {
+                let mut end = world.state.clone();
+                end.positions[sheet].iter_mut().for_each(|x| x[2] -= distance - share * kept);
+                let free = swept_free(&world.model, &filter, &world.state, &end, Par::Serial).is_empty();
+                assert_eq!(free, !hit, "from {distance} to {share} of {kept}");
+            }
+        }
+    }
 }
 
 #[test]
