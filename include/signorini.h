@@ -1404,7 +1404,7 @@ typedef struct SgnStepDesc {
    */
   SgnPolicy policy;
   /**
-   * Outer iterations of one solve at most.
+   * Outer iterations of a step at most: each solve may use half of what is left, and always a fiftieth.
    */
   uint32_t iterations_max;
   /**

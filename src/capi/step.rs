@@ -69,7 +69,7 @@ pub struct SgnStepDesc {
     pub friction_cone: SgnFrictionCone,
     /// An `SGN_POLICY_` constant.
     pub policy: SgnPolicy,
-    /// Outer iterations of one solve at most.
+    /// Outer iterations of a step at most: each solve may use half of what is left, and always a fiftieth.
     pub iterations_max: u32,
     /// Rounds of constraint manifold refinement before the step is divided.
     pub rounds_max: u32,

@@ -1,5 +1,6 @@
 //! The metric A of a step: lumped masses, host systems over one or more bodies, rigid bodies, infinite masses.
 
+use super::Translations;
 use crate::kinematics::world_inertia;
 use crate::linalg::BlockMatrix;
 use crate::math::{
@@ -26,6 +27,8 @@ pub struct Metric {
     pub uncoupled: Vec<bool>,
     /// Host system of each block; `u32::MAX` without.
     pub system: Vec<u32>,
+    /// Translations of what is coupled.
+    pub translations: Translations,
 }
 
 impl Metric {
@@ -53,7 +56,8 @@ impl Metric {
         check_symmetry(&matrix)?;
         let inverse_diagonal = inverse_blocks(model, &matrix, &fixed)?;
         let uncoupled = matrix.row_offsets.windows(2).map(|w| w[1] - w[0] == 1).collect();
-        Ok(Metric { matrix, inverse_diagonal, lumped, fixed, uncoupled, system: system_of })
+        let translations = Translations::new(&matrix, &linear_blocks(model));
+        Ok(Metric { matrix, inverse_diagonal, lumped, fixed, uncoupled, system: system_of, translations })
     }
 
     /// Blocks that impulses reach: those with one, and every block of a system that has one.
@@ -77,6 +81,15 @@ impl Metric {
     pub fn norm_squared(&self, v: &[Vec3], par: Par) -> f64 {
         par.sum(v.len(), |i| if self.fixed[i] { 0.0 } else { crate::math::dot(v[i], self.matrix.row_product(i, v)) })
     }
+}
+
+/// Which blocks are velocities of points: all but the angular ones of rigid bodies.
+fn linear_blocks(model: &Model) -> Vec<bool> {
+    let mut linear = vec![true; model.block_count];
+    for body in model.bodies.iter().filter(|b| matches!(b.description.kind, Kind::Rigid { .. })) {
+        linear[body.blocks.start + 1] = false;
+    }
+    linear
 }
 
 fn lumped_blocks(model: &Model, state: &State) -> (Vec<Mat3>, Vec<bool>) {

@@ -1,7 +1,7 @@
 //! Constraint manifold refinement of one segment [Otaduy09, §4, steps 3 and 4].
 
 use super::constraint_set::ConstraintSet;
-use super::{ContactProblem, Memory, Scratch, SolverReport, solve};
+use super::{ContactProblem, Memory, Scratch, SolverReport, SolverScratch, solve};
 use crate::constraint::{BuiltRows, Linearisation, Metric, build_rows};
 use crate::contact_search::{BodyFilter, Hit, Passing, near_contacts, swept_hits};
 use crate::math::{Vec3, add, mat_vec, norm, scale, sub};
@@ -18,12 +18,17 @@ const TIGHTEST: f64 = 1e-9;
 /// Share of the smallest thickness that a row may be missed by within the first tolerance.
 const POSITION_SHARE: f64 = 0.1;
 
-/// A step that has spent this many full solves' iterations leaves each further solve a small share of the cap: what
-/// conflicts this much is a matter for the fail-safes.
-const FULL_SOLVES: u32 = 4;
+/// Tightest contact tolerance that thin pairs ask for before continuous detection has found a miss.
+const TIGHTEST_AT_FIRST: f64 = 1e-5;
 
-/// That share is one part in this many.
-const SMALL_SHARE: u32 = 20;
+/// A solve may use up this part of the iterations that the step has left: what conflicts is a matter for the fail-safes.
+const SHARE_OF_LEFT: u32 = 2;
+
+/// A solve may always use this part of the step's iterations.
+const SMALLEST_SHARE: u32 = 50;
+
+/// Solves of one round until the translation that balances momentum is within the contact tolerance.
+const BALANCES_MAX: u32 = 3;
 
 /// A row of a turning body whose true gap differs from the linear one by more than this share of the required gap is
 /// linearised anew.
@@ -210,20 +215,10 @@ fn solve_round(
         refined.velocities.iter().zip(unconstrained).map(|(v, u)| sub(*v, *u)).collect()
     };
     let demanded = built.rows.normal_targets.iter().fold(0.0_f64, |a, c| a.max(*c));
-    let velocity_scale = positive_or_one(scale_of_motion.max(demanded));
-    let thinnest = set.contacts.iter().fold(f64::INFINITY, |a, c| a.min(c.thickness));
-    let by_thickness = POSITION_SHARE * thinnest / (segment.dt * velocity_scale);
-    let start = around.settings.contact_tolerance;
-    let contact_tolerance = (start.min(by_thickness) * tolerance_factor).max(TIGHTEST.min(start));
-    let iterations_max = match around.settings.iterations_max {
-        max if account.iterations < max.saturating_mul(FULL_SOLVES) => max,
-        max => max.div_ceil(SMALL_SHARE),
-    };
+    let velocity_scale = scale_of_motion.max(demanded);
     let settings = Settings {
-        iterations_max,
-        contact_tolerance,
-        velocity_tolerance: around.settings.velocity_tolerance * (contact_tolerance / start).max(1e-3),
-        ..*around.settings
+        iterations_max: iterations_left(around.settings.iterations_max, account.iterations),
+        ..solve_tolerances(around.settings, set, segment.dt * velocity_scale, tolerance_factor)
     };
     let problem = ContactProblem {
         matrix: &metric.matrix,
@@ -231,7 +226,14 @@ fn solve_round(
         rows: &built.rows,
         velocity_scale,
     };
-    let report = solve(&problem, &mut impulses, &mut dv, &settings, &mut scratch.solver, around.par);
+    let report = if velocity_scale > 0.0 {
+        solve_balanced(&problem, metric, &built, &mut impulses, &mut dv, &settings, &mut scratch.solver, around.par)
+    } else {
+        // Nothing moves and no row asks for anything.
+        impulses.fill([0.0; 3]);
+        dv.fill([0.0; 3]);
+        SolverReport { converged: true, ..SolverReport::default() }
+    };
     account.add(&report);
     set.keep(&built, &impulses);
     refined.block_impulses = block_impulses(model.block_count, &built, &impulses);
@@ -247,6 +249,56 @@ fn solve_round(
     }
     account.solve += lap(&mut clock);
     report.converged
+}
+
+/// The tolerances of a solve in which the fastest part moves by `way` `[m]`: no row is missed by more than a share of the
+/// smallest thickness.
+fn solve_tolerances(settings: &Settings, set: &ConstraintSet, way: f64, factor: f64) -> Settings {
+    let start = settings.contact_tolerance;
+    let thinnest = set.contacts.iter().fold(f64::INFINITY, |a, c| a.min(c.thickness));
+    let by_thickness = (POSITION_SHARE * thinnest / way).max(TIGHTEST_AT_FIRST);
+    let contact_tolerance = (start.min(by_thickness) * factor).max(TIGHTEST.min(start));
+    let velocity_tolerance = settings.velocity_tolerance * (contact_tolerance / start).max(1e-3);
+    Settings { contact_tolerance, velocity_tolerance, ..*settings }
+}
+
+/// Iterations of the next solve of a step that may make `max` in all and has made `done`.
+fn iterations_left(max: u32, done: u32) -> u32 {
+    (max.saturating_sub(done) / SHARE_OF_LEFT).max(max.div_ceil(SMALLEST_SHARE))
+}
+
+/// Solves, and translates what is coupled so that its momentum changes by the impulses, to rounding; again from there
+/// where that moved rows by more than the contact tolerance. Residuals count the translation.
+fn solve_balanced(
+    problem: &ContactProblem,
+    metric: &Metric,
+    built: &BuiltRows,
+    impulses: &mut [Vec3],
+    dv: &mut [Vec3],
+    settings: &Settings,
+    scratch: &mut SolverScratch,
+    par: Par,
+) -> SolverReport {
+    let mut settings = *settings;
+    let mut total = SolverReport::default();
+    for _ in 0..BALANCES_MAX {
+        let report = solve(problem, impulses, dv, &settings, scratch, par);
+        let given = block_impulses(dv.len(), built, impulses);
+        let moved = metric.translations.balance(problem.matrix, &given, dv);
+        // A row weighs both its sides with one at most.
+        let off = 2.0 * moved / problem.velocity_scale;
+        total = SolverReport {
+            iterations: total.iterations + report.iterations,
+            complementarity_residual: report.complementarity_residual + off,
+            friction_residual: report.friction_residual + off,
+            ..report
+        };
+        settings.iterations_max = settings.iterations_max.saturating_sub(report.iterations);
+        if off <= settings.contact_tolerance || !report.converged || settings.iterations_max == 0 {
+            break;
+        }
+    }
+    total
 }
 
 /// `C^T p` per block.
@@ -316,8 +368,4 @@ fn worst_linearisation(segment: &Segment, refined: &Refined, end: &State) -> f64
 /// Fastest vertex between two sets of positions `[m/s]`.
 fn fastest(x0: &[Vec3], x1: &[Vec3], dt: f64) -> f64 {
     x0.iter().zip(x1).fold(0.0_f64, |a, (p, q)| a.max(norm(scale(1.0 / dt, sub(*q, *p)))))
-}
-
-fn positive_or_one(scale: f64) -> f64 {
-    if scale > 0.0 { scale } else { 1.0 }
 }

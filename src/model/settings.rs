@@ -52,7 +52,7 @@ pub struct Settings {
     pub contact_tolerance: f64,
     /// Bound of the estimated relative velocity error.
     pub velocity_tolerance: f64,
-    /// Outer iterations of one constrained dynamics solve at most.
+    /// Outer iterations of a step: each constrained dynamics solve may use half of what is left, and always a fiftieth.
     pub iterations_max: u32,
     /// Iterations of operator splitting before the relaxation of [`SolverChoice::Automatic`]; 0 for none. They pay where
     /// a coarse answer to fast moving, stiff cloth is enough.

@@ -79,3 +79,51 @@ fn host_matrices_must_be_symmetric_with_positive_definite_diagonal_blocks() {
     bad[3] = f64::NAN;
     assert!(matches!(with_system(bad, false), Err(StepError::BadInput(_))));
 }
+
+/// Positive definite diagonal blocks do not make a matrix positive definite: whatever comes of it, the step ends clean
+/// or is refused.
+#[test]
+fn an_indefinite_host_matrix_ends_in_finite_numbers() {
+    let mut host = crate::support::scenes::crumple(8, 1);
+    let mut touched = 0;
+    for _ in 0..60 {
+        if touched == 2 {
+            return;
+        }
+        host.prepare();
+        for system in &mut host.drives.systems {
+            for (row, slots) in system.description.row_offsets.windows(2).enumerate() {
+                for k in slots[0]..slots[1] {
+                    if system.description.columns[k] as usize != row {
+                        system.values[k].iter_mut().flatten().for_each(|v| *v *= 3.0);
+                    }
+                }
+            }
+        }
+        let (settings, dt) = (host.settings, host.dt);
+        let outcome = signorini::implicit_contact::advance(
+            &host.model,
+            &mut host.state,
+            &host.drives,
+            &mut host.memory,
+            &settings,
+            dt,
+            &mut host.result,
+            &mut host.scratch,
+            signorini::parallel::Par::Serial,
+        );
+        match outcome {
+            Ok(report) => {
+                assert_eq!(report.intersections, Some(0));
+                touched += u32::from(report.contacts > 0);
+            }
+            Err(error) => {
+                assert!(matches!(error, StepError::SingularSystem { .. }), "{error:?}");
+                return;
+            }
+        }
+        assert!(host.state.positions.iter().flatten().all(|x| x.is_finite()));
+        host.velocities.clone_from(&host.result.end_velocities);
+    }
+    panic!("the sheet must touch, or its matrix be refused");
+}

@@ -31,6 +31,25 @@ fn linear_momentum_is_exchanged_to_rounding() {
     }
 }
 
+/// A host's matrix: the masses gain what contacts give, at any accuracy of the solve.
+#[test]
+fn linear_momentum_holds_with_a_host_matrix_at_any_tolerance() {
+    for (tolerance, iterations_max) in [(1e-3, 2000), (1e-1, 2000), (1e-3, 10)] {
+        let mut host = crate::support::scenes::crumple(12, 1);
+        host.settings.contact_tolerance = tolerance;
+        host.settings.velocity_tolerance = 20.0 * tolerance;
+        host.settings.iterations_max = iterations_max;
+        let mut touched = 0;
+        for step in 0..70 {
+            let facts = host.step(signorini::parallel::Par::Serial).expect("a step");
+            let error = facts.momentum_error;
+            assert!(error < 1e-9, "tolerance {tolerance} step {step}: {error:e}, {:?}", facts.report);
+            touched += u32::from(facts.report.active_contacts > 0);
+        }
+        assert!(touched > 10, "the sheet must touch");
+    }
+}
+
 #[test]
 fn impulses_pulled_are_masses_times_velocity_changes() {
     let mut world = strike(5);
