@@ -62,7 +62,9 @@ pub(super) fn run(
     let contacts = at.p.len();
     let mut l = Lagrangian {
         task,
-        penalties: task.packed.contacts.iter().map(|c| penalty(c.natural_scale)).collect(),
+        penalties: task.par.map_indexed(contacts, |c| {
+            penalty(task.packed.natural_scale(c, task.problem.rows, task.problem.inverse_diagonal))
+        }),
         trial: vec![[0.0; 3]; contacts],
         impulses: Vec::new(),
         stiffness: vec![None; contacts],
@@ -110,7 +112,7 @@ impl Lagrangian<'_, '_> {
             now.p.copy_from_slice(&self.trial);
             let residuals = measure(self.task, &now, buffers, &mut self.work);
             self.product.copy_from_slice(&buffers.product);
-            match test.check(self.task, &now, &residuals, iterations, at, buffers, &mut self.work) {
+            match test.check(self.task, &now, &residuals, at, buffers, &mut self.work) {
                 Verdict::Converged(e) => return Run { iterations, ending: Ending::Converged, error: Some(e) },
                 Verdict::Continue => {}
                 Verdict::Diverged => {

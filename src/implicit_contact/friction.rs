@@ -36,16 +36,6 @@ impl LocalMetric {
         }
     }
 
-    /// The metric of `r G`, `r > 0`.
-    pub fn scaled(&self, r: f64) -> LocalMetric {
-        LocalMetric {
-            entries: self.entries.map(|g| r * g),
-            normal_inverse: self.normal_inverse / r,
-            tangent_inverse: self.tangent_inverse.map(|g| g / r),
-            tangent_step: self.tangent_step / r,
-        }
-    }
-
     /// `G dp`.
     #[inline(always)]
     pub fn apply(&self, dp: Vec3) -> Vec3 {

@@ -50,7 +50,7 @@ pub(super) fn run(
         }
         respond(task, &mut now, buffers, work);
         let residuals = measure(task, &now, buffers, work);
-        match test.check(task, &now, &residuals, k, at, buffers, work) {
+        match test.check(task, &now, &residuals, at, buffers, work) {
             Verdict::Converged(e) => return Run { iterations: k, ending: Ending::Converged, error: Some(e) },
             Verdict::Continue => {}
             Verdict::Diverged => return Run { iterations: k, ending: Ending::Stagnated, error: None },

@@ -68,7 +68,7 @@ pub(super) fn run(
         if k % CHECK_EVERY != 0 && k != iterations_max && residuals.merit().is_finite() {
             continue;
         }
-        match test.check(task, &now, &residuals, k, at, buffers, work) {
+        match test.check(task, &now, &residuals, at, buffers, work) {
             Verdict::Converged(e) => return (Run { iterations: k, ending: Ending::Converged, error: Some(e) }, paper),
             Verdict::Continue => {}
             Verdict::Diverged => {

@@ -8,9 +8,11 @@
 //! * `full_anticipation`: the dense baseline
 //! * `block_diagonal`: the solver for lumped masses and rigid bodies alone
 //! * `packed_contacts`: contacts laid out for relaxation passes
-//! * `single_pass`: the relaxation pass in single precision
+//! * `single_pass`: the relaxation pass in single precision, over the contacts that are near
+//! * `single_relaxation`, `double_relaxation`: iterations of the default solver in either precision
 //! * `friction`: the local solve of one contact
-//! * `residuals`: natural map, dynamics residual, velocity error
+//! * `residuals`: natural map, dynamics residual
+//! * `velocity_error`: the estimate that decides when to stop
 //! * `constraint_set`: the contacts of a segment, which grow from round to round
 //! * `manifold_refinement`: rounds of solving and continuous detection
 //! * `fall_back`: the fail-safes of a segment in their order
@@ -25,6 +27,7 @@ mod augmented_lagrangian;
 mod block_diagonal;
 mod commit;
 mod constraint_set;
+mod double_relaxation;
 mod fall_back;
 mod friction;
 mod full_anticipation;
@@ -35,8 +38,10 @@ mod packed_contacts;
 mod problem;
 mod residuals;
 mod single_pass;
+mod single_relaxation;
 mod splitting_start;
 mod stop_test;
+mod velocity_error;
 
 pub use advance::{Scratch, advance};
 pub use memory::{Certified, Memory, RememberedContact};

@@ -27,8 +27,6 @@ pub(super) struct Contact {
     pub target: Vec3,
     /// Friction coefficient.
     pub friction: f64,
-    /// Scales of the natural map: `G_nn` and the largest tangential eigenvalue for the block diagonal of A itself.
-    pub natural_scale: [f64; 2],
     /// Index in the row set.
     pub source: u32,
     /// Whether entries must be read from the row set.
@@ -164,7 +162,7 @@ impl PackedContacts {
         } else {
             Colouring { order: (0..rows.len() as u32).collect(), offsets: vec![0, rows.len()] }
         };
-        let contacts = par.map_indexed(rows.len(), |k| pack(rows, order.order[k] as usize, problem.inverse_diagonal));
+        let contacts = par.map_indexed(rows.len(), |k| pack(rows, order.order[k] as usize));
         let mut packed = PackedContacts { contacts, groups: order.offsets, ..PackedContacts::default() };
         packed.gather_lists(rows, blocks);
         packed
@@ -205,12 +203,31 @@ impl PackedContacts {
         self.angular_offsets = if rows.angular.is_empty() { Vec::new() } else { angular_counts };
     }
 
-    /// Local metrics of all contacts for the block-diagonal metric with this inverse.
+    /// Local metric of contact `c` for the block-diagonal metric with this inverse.
+    pub fn metric(&self, c: usize, rows: &RowSet, inverse: &[Mat3]) -> LocalMetric {
+        let contact = &self.contacts[c];
+        LocalMetric::new(frame_metric(&contact.frame, &world_metric(rows, contact, inverse)))
+    }
+
+    /// Local metrics of all contacts.
     pub fn metrics(&self, rows: &RowSet, inverse: &[Mat3], par: Par) -> Vec<LocalMetric> {
-        par.map_indexed(self.contacts.len(), |c| {
+        par.map_indexed(self.contacts.len(), |c| self.metric(c, rows, inverse))
+    }
+
+    /// Adds block by block `W^T R^T p` of the contacts `list` to `out`, in their order.
+    pub fn scatter(&self, rows: &RowSet, list: impl Iterator<Item = usize>, p: &[Vec3], out: &mut [Vec3]) {
+        for c in list {
             let contact = &self.contacts[c];
-            LocalMetric::new(frame_metric(&contact.frame, &world_metric(rows, contact, inverse)))
-        })
+            let f = contact.in_world(p[c]);
+            if contact.general {
+                rows.scatter(contact.source as usize, f, out);
+                continue;
+            }
+            for (b, w) in contact.blocks.iter().zip(contact.weights) {
+                let b = *b as usize;
+                out[b] = add_scaled(out[b], w, f);
+            }
+        }
     }
 
     /// World impulses `R^T p` of all contacts.
@@ -332,11 +349,18 @@ impl PackedContacts {
         respond(contact, cx.rows, cx.inverse, contact.in_world(change), u);
     }
 
+    /// Scales of the natural map of contact `c`: `G_nn` and the largest tangential eigenvalue for the block diagonal of A
+    /// itself.
+    pub fn natural_scale(&self, c: usize, rows: &RowSet, inverse_diagonal: &[Mat3]) -> [f64; 2] {
+        let metric = self.metric(c, rows, inverse_diagonal);
+        [metric.entries[0], if metric.tangent_step > 0.0 { 1.0 / metric.tangent_step } else { 0.0 }]
+    }
+
     /// Natural-map residuals of contact `c` at `p` and contact velocity `w` `[m/s]`: normal, tangential.
     #[inline]
-    pub fn natural_map(&self, cone: FrictionCone, c: usize, p: Vec3, w: Vec3) -> [f64; 2] {
+    pub fn natural_map(&self, cone: FrictionCone, c: usize, scales: [f64; 2], p: Vec3, w: Vec3) -> [f64; 2] {
         let contact = &self.contacts[c];
-        let [dn, dt] = contact.natural_scale;
+        let [dn, dt] = scales;
         if dn <= 0.0 {
             return [0.0; 2];
         }
@@ -386,7 +410,7 @@ fn entry_blocks(rows: &RowSet, i: usize) -> impl Iterator<Item = u32> + Clone + 
     linear.iter().copied().chain(angular.iter().map(|a| a.block))
 }
 
-fn pack(rows: &RowSet, i: usize, inverse: &[Mat3]) -> Contact {
+fn pack(rows: &RowSet, i: usize) -> Contact {
     let linear = rows.offsets[i] as usize..rows.offsets[i + 1] as usize;
     let repeated = (linear.start..linear.end).any(|k| rows.blocks[linear.start..k].contains(&rows.blocks[k]));
     let general = repeated || linear.len() > INLINE_ENTRIES || rows.angular_offsets[i] != rows.angular_offsets[i + 1];
@@ -403,20 +427,15 @@ fn pack(rows: &RowSet, i: usize, inverse: &[Mat3]) -> Contact {
         }
     }
     let [h1, h2] = rows.sliding_velocities[i];
-    let mut contact = Contact {
+    Contact {
         blocks,
         weights,
         frame: rows.frames[i],
         target: [-rows.normal_targets[i], h1, h2],
         friction: rows.friction[i].max(0.0),
-        natural_scale: [0.0; 2],
         source: i as u32,
         general,
-    };
-    let metric = LocalMetric::new(frame_metric(&contact.frame, &world_metric(rows, &contact, inverse)));
-    let tangent = if metric.tangent_step > 0.0 { 1.0 / metric.tangent_step } else { 0.0 };
-    contact.natural_scale = [metric.entries[0], tangent];
-    contact
+    }
 }
 
 /// `R^T S R` for a symmetric `S` in the contact's frame.

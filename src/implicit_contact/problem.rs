@@ -4,8 +4,9 @@ use super::accelerated_relaxation::Control;
 use super::friction::project;
 use super::iterative_anticipation::{self, Inner};
 use super::packed_contacts::PackedContacts;
-use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure, velocity_error};
+use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure};
 use super::stop_test::{Ending, Run};
+use super::velocity_error::velocity_error;
 use super::{accelerated_relaxation, augmented_lagrangian, block_diagonal, full_anticipation, splitting_start};
 use crate::constraint::RowSet;
 use crate::linalg::{BlockMatrix, SinglePrecision};
@@ -80,14 +81,13 @@ pub fn solve(
     let packed = PackedContacts::new(problem, par);
     let velocity_scale = velocity_scale(problem);
     let typical_mass = typical_mass(problem, &packed);
-    let single = SinglePrecision::new(problem.matrix, par);
+    let single = SinglePrecision::new(problem.matrix);
     let task = Task {
         problem,
         single: &single,
         packed: &packed,
         settings,
         velocity_scale,
-        typical_mass,
         impulse_floor: (IMPULSE_FLOOR * velocity_scale * typical_mass.sqrt()).max(f64::MIN_POSITIVE),
         par,
     };
@@ -248,6 +248,6 @@ fn finish(
     report.complementarity_residual = residuals.normal;
     report.friction_residual = residuals.friction;
     report.dynamics_residual = residuals.dynamics;
-    report.velocity_error = error.unwrap_or_else(|| velocity_error(task, at, &residuals, buffers, work));
+    report.velocity_error = error.unwrap_or_else(|| velocity_error(task, at, &residuals, f64::INFINITY, buffers, work));
     report.work = work.blocks + work.contacts;
 }

@@ -1,244 +1,332 @@
-//! The relaxation pass in single precision: a third of the instructions and half of the memory of the pass in
-//! [`super::packed_contacts`], with the same steps.
+//! The relaxation pass in single precision, over the contacts that press or are about to.
 //!
-//! Everything is made dimensionless first (velocities by the velocity scale, masses by a mean mass, both rounded to
-//! powers of two), so that no unit leaves the range of f32. Rounding only affects how well a prediction is relaxed:
-//! callers keep multipliers and responses consistent by renewing the prediction from the multipliers in f64.
+//! Everything is made dimensionless first (velocities and masses relative to powers of two), so that no unit leaves the
+//! range of f32. Velocities are increments from a base that the caller renews in f64, with the targets: rounding is
+//! relative to what still changes, not to the solution.
+//!
+//! All contacts are screened now and then, with their normal velocity alone; those that press, or should, get a record. In crowded scenes nine of ten contacts never do.
 
-use super::friction::LocalMetric;
-use super::packed_contacts::PackedContacts;
+use super::friction::{LocalMetric, project};
+use super::packed_contacts::{PackedContacts, contact_velocity};
 use crate::constraint::RowSet;
+use crate::linalg::power_of_two;
+use crate::math::quad::{self, Quad, add, add_scaled, combine, scale, sub};
+use crate::math::simd::{Kernel, run_wide};
 use crate::math::{Mat3, Vec3};
 use crate::model::FrictionCone;
-use crate::parallel::Par;
 
-/// Three lanes and one of padding.
-pub(super) type Lanes = [f32; 4];
+/// No record, or no general entries.
+const NONE: u32 = u32::MAX;
 
-/// One contact.
+/// The normal velocity of one contact.
+#[derive(Clone, Copy, Debug, Default)]
+struct Screen {
+    blocks: [u32; 4],
+    weights: [f32; 4],
+    /// Normal, and the target of the normal velocity.
+    plane: Quad,
+}
+
+/// One contact that was near.
 #[derive(Clone, Copy, Debug, Default)]
 struct Record {
     blocks: [u32; 4],
     weights: [f32; 4],
     /// `n, t1, t2`
-    rows: [Lanes; 3],
+    rows: [Quad; 3],
     /// The same by columns: x, y, z of the three axes.
-    columns: [Lanes; 3],
-    target: Lanes,
+    columns: [Quad; 3],
+    /// `C base + target`
+    target: Quad,
+    p: Quad,
     /// `G`: nn, n1, n2 and friction; 11, 12, 22 and its largest eigenvalue's inverse.
-    normal: Lanes,
-    tangent: Lanes,
+    normal: Quad,
+    tangent: Quad,
     /// Inverse of the tangential block (11, 12, 22) and `1 / G_nn`.
-    inverse: Lanes,
-    /// Position in `general`, or `u32::MAX`.
+    inverse: Quad,
+    /// Position in `general`, or `NONE`.
     general: u32,
+    /// The contact, and the base that the target belongs to.
+    contact: u32,
+    base: u32,
 }
 
 /// Entries of a contact with more than four, or with angular ones.
 #[derive(Clone, Debug, Default)]
 struct General {
     linear: Vec<(u32, f32)>,
-    angular: Vec<(u32, Lanes)>,
+    angular: Vec<(u32, Quad)>,
 }
 
-/// Contacts and the metric of the pass, rounded.
-#[derive(Default)]
-pub(super) struct SinglePass {
+/// The contacts of a problem, rounded.
+pub(super) struct SinglePass<'a> {
+    packed: &'a PackedContacts,
+    rows: &'a RowSet,
+    screens: Vec<Screen>,
+    /// Contacts that were near at some time, and the record of each contact.
     records: Vec<Record>,
+    record_of: Vec<u32>,
     general: Vec<General>,
-    /// Columns of the inverse blocks.
-    inverse: Vec<[Lanes; 3]>,
+    /// Records to relax, by contact.
+    near: Vec<u32>,
+    /// Columns of the inverse blocks of the metric, and the same in double precision.
+    inverse: Vec<[Quad; 3]>,
+    exact_inverse: Vec<Mat3>,
     /// Velocity and mass that the rounded numbers are relative to.
     velocity: f64,
     mass: f64,
+    /// Number of times the base was renewed.
+    bases: u32,
 }
 
-fn lanes(v: Vec3, scale: f64) -> Lanes {
-    [(scale * v[0]) as f32, (scale * v[1]) as f32, (scale * v[2]) as f32, 0.0]
-}
+impl<'a> SinglePass<'a> {
+    /// Takes over the contacts; `mass` is a power of two, `velocity` typical of the problem.
+    pub fn new(packed: &'a PackedContacts, rows: &'a RowSet, mass: f64, velocity: f64) -> SinglePass<'a> {
+        let velocity = power_of_two(velocity);
+        let screens = packed.contacts.iter().map(|contact| {
+            let n = contact.frame[0];
+            // What the screen cannot see is always near.
+            let target = if contact.general { f32::NEG_INFINITY } else { (contact.target[0] / velocity) as f32 };
+            let plane = [n[0] as f32, n[1] as f32, n[2] as f32, target];
+            Screen { blocks: contact.blocks, weights: contact.weights.map(|w| w as f32), plane }
+        });
+        SinglePass {
+            packed,
+            rows,
+            screens: screens.collect(),
+            records: Vec::new(),
+            record_of: vec![NONE; packed.contacts.len()],
+            general: Vec::new(),
+            near: Vec::new(),
+            inverse: Vec::new(),
+            exact_inverse: Vec::new(),
+            velocity,
+            mass,
+            bases: 0,
+        }
+    }
 
-/// The power of two at or below a positive, finite `x`; else 1.
-fn power_of_two(x: f64) -> f64 {
-    if x.is_normal() && x > 0.0 { f64::from_bits(x.to_bits() & 0x7FF0_0000_0000_0000) } else { 1.0 }
-}
+    /// Velocity `[m/s]` that rounded velocities are relative to.
+    pub fn velocity_unit(&self) -> f64 {
+        self.velocity
+    }
 
-#[inline(always)]
-fn zip(a: Lanes, b: Lanes, f: impl Fn(f32, f32) -> f32) -> Lanes {
-    [f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2]), f(a[3], b[3])]
-}
+    /// Columns of the inverse blocks of the metric.
+    pub fn inverse(&self) -> &[[Quad; 3]] {
+        &self.inverse
+    }
 
-#[inline(always)]
-fn add_scaled(a: Lanes, s: f32, b: Lanes) -> Lanes {
-    zip(a, b, |a, b| a + s * b)
-}
+    /// Takes a new block-diagonal metric.
+    pub fn set_metric(&mut self, inverse: Vec<Mat3>) {
+        let m = self.mass;
+        self.inverse.clear();
+        self.inverse.extend(inverse.iter().map(|a| [0, 1, 2].map(|c| quad::round([a[0][c], a[1][c], a[2][c]], m))));
+        self.exact_inverse = inverse;
+        for i in 0..self.records.len() {
+            self.records[i] = self.measured(self.records[i]);
+        }
+    }
 
-/// `x[0] m[0] + x[1] m[1] + x[2] m[2]`
-#[inline(always)]
-fn combine(m: &[Lanes; 3], x: Lanes) -> Lanes {
-    let first = m[0].map(|m| m * x[0]);
-    add_scaled(add_scaled(first, x[1], m[1]), x[2], m[2])
-}
+    /// The record with the local metric of its contact.
+    fn measured(&self, mut record: Record) -> Record {
+        let m = self.mass;
+        let metric = self.packed.metric(record.contact as usize, self.rows, &self.exact_inverse);
+        let LocalMetric { entries, normal_inverse, tangent_inverse, tangent_step } = metric;
+        let [nn, n1, n2, a, b, c] = entries.map(|g| (m * g) as f32);
+        let [i, j, k] = tangent_inverse.map(|g| (g / m) as f32);
+        record.normal = [nn, n1, n2, record.normal[3]];
+        record.tangent = [a, b, c, (tangent_step / m) as f32];
+        record.inverse = [i, j, k, (normal_inverse / m) as f32];
+        record
+    }
 
-#[inline(always)]
-fn cross(a: Lanes, b: Lanes) -> Lanes {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0], 0.0]
-}
+    /// Starts from multipliers: those that press are near.
+    pub fn start(&mut self, p: &[Vec3], base: &[Vec3]) {
+        self.bases += 1;
+        self.near.clear();
+        for (c, p) in p.iter().enumerate() {
+            if p[0] > 0.0 {
+                let r = self.record(c, base);
+                self.records[r].p = quad::round(*p, 1.0 / (self.mass * self.velocity));
+                self.near.push(r as u32);
+            }
+        }
+    }
 
-impl SinglePass {
-    /// Rounds contacts and rows; `mass` and `velocity` are typical of them.
-    pub fn new(packed: &PackedContacts, rows: &RowSet, mass: f64, velocity: f64) -> SinglePass {
-        let (mass, velocity) = (power_of_two(mass), power_of_two(velocity));
-        let mut pass = SinglePass { velocity, mass, ..SinglePass::default() };
-        pass.records.reserve(packed.contacts.len());
-        for contact in &packed.contacts {
-            let f = contact.frame.map(|v| lanes(v, 1.0));
+    /// Takes `base` as what velocities are relative to from now on.
+    pub fn renew(&mut self, base: &[Vec3]) {
+        self.bases += 1;
+        for i in 0..self.near.len() {
+            self.aim(self.near[i] as usize, base);
+        }
+    }
+
+    /// The target of record `r` for this base.
+    fn aim(&mut self, r: usize, base: &[Vec3]) {
+        let contact = &self.packed.contacts[self.records[r].contact as usize];
+        self.records[r].target = quad::round(contact_velocity(contact, self.rows, base), 1.0 / self.velocity);
+        self.records[r].base = self.bases;
+    }
+
+    /// The record of contact `c`, made if need be, up to date.
+    fn record(&mut self, c: usize, base: &[Vec3]) -> usize {
+        let mut r = self.record_of[c] as usize;
+        if self.record_of[c] == NONE {
+            r = self.records.len();
+            self.record_of[c] = r as u32;
+            let contact = &self.packed.contacts[c];
+            let f = contact.frame.map(|v| quad::round(v, 1.0));
             let mut record = Record {
                 blocks: contact.blocks,
                 weights: contact.weights.map(|w| w as f32),
                 rows: f,
                 columns: [0, 1, 2].map(|axis| [f[0][axis], f[1][axis], f[2][axis], 0.0]),
-                target: lanes(contact.target, 1.0 / velocity),
-                general: u32::MAX,
+                general: NONE,
+                contact: c as u32,
                 ..Record::default()
             };
             record.normal[3] = contact.friction as f32;
             if contact.general {
-                record.general = pass.general.len() as u32;
-                pass.general.push(general(rows, contact.source as usize));
+                record.general = self.general.len() as u32;
+                self.general.push(general(self.rows, contact.source as usize));
             }
-            pass.records.push(record);
+            let record = self.measured(record);
+            self.records.push(record);
         }
-        pass
-    }
-
-    /// Takes a new block-diagonal metric.
-    pub fn set_metric(&mut self, inverse: &[Mat3], metrics: &[LocalMetric], par: Par) {
-        let m = self.mass;
-        self.inverse = par.map_indexed(inverse.len(), |b| {
-            let a = &inverse[b];
-            [0, 1, 2].map(|c| lanes([a[0][c], a[1][c], a[2][c]], m))
-        });
-        for (record, metric) in self.records.iter_mut().zip(metrics) {
-            let [nn, n1, n2, a, b, c] = metric.entries.map(|g| (m * g) as f32);
-            let [i, j, k] = metric.tangent_inverse.map(|g| (g / m) as f32);
-            record.normal = [nn, n1, n2, record.normal[3]];
-            record.tangent = [a, b, c, (metric.tangent_step / m) as f32];
-            record.inverse = [i, j, k, (metric.normal_inverse / m) as f32];
+        if self.records[r].base != self.bases {
+            self.aim(r, base);
         }
+        r
     }
 
-    /// Rounds predicted velocities.
-    pub fn round_velocities(&self, u: &[Vec3], out: &mut Vec<Lanes>, par: Par) {
-        let r = 1.0 / self.velocity;
-        out.resize(u.len(), [0.0; 4]);
-        par.map_into(out, |b| lanes(u[b], r));
+    /// Finds the contacts that press, or whose law the velocities `v` (not increments) violate. Contacts with more than four entries are always near.
+    pub fn screen(&mut self, v: &[Quad], base: &[Vec3]) -> u64 {
+        self.near.clear();
+        for c in 0..self.screens.len() {
+            let r = self.record_of[c];
+            let presses = r != NONE && self.records[r as usize].p[0] > 0.0;
+            if presses || self.screens[c].normal_velocity(v) < 0.0 {
+                let r = self.record(c, base);
+                self.near.push(r as u32);
+            }
+        }
+        self.screens.len() as u64
     }
 
-    /// Rounds multipliers.
-    pub fn round_multipliers(&self, p: &[Vec3]) -> Vec<Lanes> {
-        let r = 1.0 / (self.mass * self.velocity);
-        p.iter().map(|p| lanes(*p, r)).collect()
-    }
-
-    /// Adds to `u` what the passes changed since it was rounded.
-    #[inline]
-    pub fn add_change(&self, u: Vec3, after: Lanes) -> Vec3 {
-        let before = lanes(u, 1.0 / self.velocity);
-        let change = |i: usize| self.velocity * (f64::from(after[i]) - f64::from(before[i]));
-        [u[0] + change(0), u[1] + change(1), u[2] + change(2)]
-    }
-
-    /// Multipliers in units of the problem, within their limits in f64 too.
-    pub fn multipliers(&self, packed: &PackedContacts, cone: FrictionCone, p: &[Lanes], out: &mut Vec<Vec3>) {
+    /// Puts the multipliers of all records into `p`, in units of the problem and within their limits in f64 too.
+    pub fn multipliers(&self, cone: FrictionCone, p: &mut [Vec3]) {
         let s = self.mass * self.velocity;
-        out.clear();
-        out.extend(p.iter().zip(&packed.contacts).map(|(p, contact)| {
-            let p = [s * f64::from(p[0]), s * f64::from(p[1]), s * f64::from(p[2])];
-            super::friction::project(cone, contact.friction, p)
-        }));
-    }
-
-    /// One pass over `list`, or over all contacts in order; returns the contacts visited.
-    pub fn pass(&self, cone: FrictionCone, list: Option<&[u32]>, p: &mut [Lanes], u: &mut [Lanes]) -> u64 {
-        match (list, cone) {
-            (Some(list), FrictionCone::Disc) => {
-                list.iter().for_each(|c| self.relax::<true>(*c as usize, p, u));
-                list.len() as u64
-            }
-            (Some(list), FrictionCone::Pyramid) => {
-                list.iter().for_each(|c| self.relax::<false>(*c as usize, p, u));
-                list.len() as u64
-            }
-            (None, FrictionCone::Disc) => {
-                (0..self.records.len()).for_each(|c| self.relax::<true>(c, p, u));
-                self.records.len() as u64
-            }
-            (None, FrictionCone::Pyramid) => {
-                (0..self.records.len()).for_each(|c| self.relax::<false>(c, p, u));
-                self.records.len() as u64
-            }
+        for record in &self.records {
+            let c = record.contact as usize;
+            p[c] = project(cone, self.packed.contacts[c].friction, quad::widen(record.p, s));
         }
     }
 
+    /// The contacts to relax, in order.
+    pub fn near(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
+        self.near.iter().map(|r| self.records[*r as usize].contact as usize)
+    }
+
+    /// Relaxes the near contacts one after the other against the increments `u`; returns the contacts visited.
+    pub fn pass(&mut self, cone: FrictionCone, u: &mut [Quad]) -> u64 {
+        let SinglePass { records, general, near, inverse, .. } = self;
+        let sweep = Sweep { records, general, near, inverse, u, disc: cone == FrictionCone::Disc };
+        run_wide(sweep);
+        self.near.len() as u64
+    }
+}
+
+impl Screen {
     #[inline(always)]
-    fn relax<const DISC: bool>(&self, c: usize, p: &mut [Lanes], u: &mut [Lanes]) {
-        let r = &self.records[c];
-        let seen = if r.general == u32::MAX {
-            let first = u[r.blocks[0] as usize].map(|x| r.weights[0] * x);
-            let second = u[r.blocks[2] as usize].map(|x| r.weights[2] * x);
-            let first = add_scaled(first, r.weights[1], u[r.blocks[1] as usize]);
-            let second = add_scaled(second, r.weights[3], u[r.blocks[3] as usize]);
-            zip(first, second, |a, b| a + b)
-        } else {
-            self.general[r.general as usize].seen(u)
-        };
-        let before = p[c];
-        let w = zip(combine(&r.columns, seen), r.target, |a, b| a + b);
-        if before[0] == 0.0 && w[0] >= 0.0 {
-            return;
-        }
-        let after = local_step::<DISC>(r, before, w);
-        p[c] = after;
-        let f = combine(&r.rows, zip(after, before, |a, b| a - b));
-        if r.general == u32::MAX {
-            for (b, w) in r.blocks.iter().zip(r.weights) {
-                let b = *b as usize;
-                u[b] = add_scaled(u[b], w, combine(&self.inverse[b], f));
+    fn normal_velocity(&self, v: &[Quad]) -> f32 {
+        let n = quad::multiply(seen(&self.blocks, &self.weights, v), self.plane);
+        (n[0] + n[1]) + (n[2] + self.plane[3])
+    }
+}
+
+#[inline(always)]
+fn seen(blocks: &[u32; 4], weights: &[f32; 4], v: &[Quad]) -> Quad {
+    let first = add_scaled(scale(weights[0], v[blocks[0] as usize]), weights[1], v[blocks[1] as usize]);
+    let second = add_scaled(scale(weights[2], v[blocks[2] as usize]), weights[3], v[blocks[3] as usize]);
+    add(first, second)
+}
+
+struct Sweep<'a> {
+    records: &'a mut [Record],
+    general: &'a [General],
+    near: &'a [u32],
+    inverse: &'a [[Quad; 3]],
+    u: &'a mut [Quad],
+    disc: bool,
+}
+
+impl Kernel for Sweep<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        for r in self.near {
+            let r = &mut self.records[*r as usize];
+            if self.disc {
+                r.relax::<true>(self.general, self.inverse, self.u);
+            } else {
+                r.relax::<false>(self.general, self.inverse, self.u);
             }
-        } else {
-            self.general[r.general as usize].respond(&self.inverse, f, u);
         }
     }
 }
 
-/// As [`super::friction::local_step`].
-#[inline(always)]
-fn local_step<const DISC: bool>(r: &Record, p: Lanes, w: Lanes) -> Lanes {
-    let lambda = (p[0] - w[0] * r.inverse[3]).max(0.0);
-    let bound = r.normal[3] * lambda;
-    if bound == 0.0 {
-        return [lambda, 0.0, 0.0, 0.0];
+impl Record {
+    #[inline(always)]
+    fn relax<const DISC: bool>(&mut self, general: &[General], inverse: &[[Quad; 3]], u: &mut [Quad]) {
+        let simple = self.general == NONE;
+        let seen = if simple { seen(&self.blocks, &self.weights, u) } else { general[self.general as usize].seen(u) };
+        let before = self.p;
+        let w = add(combine(&self.columns, seen), self.target);
+        if before[0] == 0.0 && w[0] >= 0.0 {
+            return;
+        }
+        self.p = self.step::<DISC>(w);
+        let f = combine(&self.rows, sub(self.p, before));
+        if simple {
+            for (b, w) in self.blocks.iter().zip(self.weights) {
+                let b = *b as usize;
+                u[b] = add_scaled(u[b], w, combine(&inverse[b], f));
+            }
+        } else {
+            general[self.general as usize].respond(inverse, f, u);
+        }
     }
-    let change = lambda - p[0];
-    let (w1, w2) = (w[1] + r.normal[1] * change, w[2] + r.normal[2] * change);
-    let [a, b, c, step] = r.tangent;
-    if DISC {
-        let [i, j, k, _] = r.inverse;
-        let stick = [p[1] - (i * w1 + j * w2), p[2] - (j * w1 + k * w2)];
-        if i + k > 0.0 && stick[0] * stick[0] + stick[1] * stick[1] <= bound * bound {
-            return [lambda, stick[0], stick[1], 0.0];
+
+    /// As [`super::friction::local_step`].
+    #[inline(always)]
+    fn step<const DISC: bool>(&self, w: Quad) -> Quad {
+        let p = self.p;
+        let lambda = (p[0] - w[0] * self.inverse[3]).max(0.0);
+        let bound = self.normal[3] * lambda;
+        if bound == 0.0 {
+            return [lambda, 0.0, 0.0, 0.0];
         }
-        let g = [p[1] - step * w1, p[2] - step * w2];
-        let length_squared = g[0] * g[0] + g[1] * g[1];
-        if length_squared <= bound * bound {
-            return [lambda, g[0], g[1], 0.0];
+        let change = lambda - p[0];
+        let (w1, w2) = (w[1] + self.normal[1] * change, w[2] + self.normal[2] * change);
+        let [a, b, c, step] = self.tangent;
+        if DISC {
+            let [i, j, k, _] = self.inverse;
+            let stick = [p[1] - (i * w1 + j * w2), p[2] - (j * w1 + k * w2)];
+            if i + k > 0.0 && stick[0] * stick[0] + stick[1] * stick[1] <= bound * bound {
+                return [lambda, stick[0], stick[1], 0.0];
+            }
+            let g = [p[1] - step * w1, p[2] - step * w2];
+            let length_squared = g[0] * g[0] + g[1] * g[1];
+            if length_squared <= bound * bound {
+                return [lambda, g[0], g[1], 0.0];
+            }
+            let s = bound / length_squared.sqrt();
+            [lambda, s * g[0], s * g[1], 0.0]
+        } else {
+            let g1 = if a > 0.0 { (p[1] - w1 / a).clamp(-bound, bound) } else { 0.0 };
+            let w2 = w2 + b * (g1 - p[1]);
+            [lambda, g1, if c > 0.0 { (p[2] - w2 / c).clamp(-bound, bound) } else { 0.0 }, 0.0]
         }
-        let s = bound / length_squared.sqrt();
-        [lambda, s * g[0], s * g[1], 0.0]
-    } else {
-        let g1 = if a > 0.0 { (p[1] - w1 / a).clamp(-bound, bound) } else { 0.0 };
-        let w2 = w2 + b * (g1 - p[1]);
-        [lambda, g1, if c > 0.0 { (p[2] - w2 / c).clamp(-bound, bound) } else { 0.0 }, 0.0]
     }
 }
 
@@ -247,24 +335,24 @@ fn general(rows: &RowSet, i: usize) -> General {
     let angular = rows.angular_offsets[i] as usize..rows.angular_offsets[i + 1] as usize;
     General {
         linear: linear.map(|k| (rows.blocks[k], rows.weights[k] as f32)).collect(),
-        angular: rows.angular[angular].iter().map(|a| (a.block, lanes(a.lever, 1.0))).collect(),
+        angular: rows.angular[angular].iter().map(|a| (a.block, quad::round(a.lever, 1.0))).collect(),
     }
 }
 
 impl General {
-    fn seen(&self, u: &[Lanes]) -> Lanes {
+    fn seen(&self, u: &[Quad]) -> Quad {
         let linear = self.linear.iter().fold([0.0; 4], |s, (b, w)| add_scaled(s, *w, u[*b as usize]));
-        self.angular.iter().fold(linear, |s, (b, lever)| add_scaled(s, 1.0, cross(u[*b as usize], *lever)))
+        self.angular.iter().fold(linear, |s, (b, lever)| add(s, quad::cross(u[*b as usize], *lever)))
     }
 
-    fn respond(&self, inverse: &[[Lanes; 3]], f: Lanes, u: &mut [Lanes]) {
+    fn respond(&self, inverse: &[[Quad; 3]], f: Quad, u: &mut [Quad]) {
         for (b, w) in &self.linear {
             let b = *b as usize;
             u[b] = add_scaled(u[b], *w, combine(&inverse[b], f));
         }
         for (b, lever) in &self.angular {
             let b = *b as usize;
-            u[b] = add_scaled(u[b], 1.0, combine(&inverse[b], cross(*lever, f)));
+            u[b] = add(u[b], combine(&inverse[b], quad::cross(*lever, f)));
         }
     }
 }

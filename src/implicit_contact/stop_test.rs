@@ -1,6 +1,7 @@
 //! When to stop: meaningful residuals first, then the estimated velocity error; and the best iterate seen.
 
-use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work, velocity_error};
+use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work};
+use super::velocity_error::velocity_error;
 
 /// Growth of the merit over the best seen that counts as divergence.
 const GROWTH: f64 = 1e3;
@@ -41,25 +42,24 @@ pub(super) enum Verdict {
 /// The test, over the checks of one run.
 pub(super) struct StopTest {
     best: f64,
-    /// No estimate before this iteration.
-    wait_until: u32,
+    /// Error over dynamics residual at the last estimate. It changes slowly, and mostly grows.
+    ratio: f64,
 }
 
 impl StopTest {
     /// A test that has seen nothing.
     pub fn new() -> StopTest {
-        StopTest { best: f64::INFINITY, wait_until: 0 }
+        StopTest { best: f64::INFINITY, ratio: 0.0 }
     }
 
     /// Judges `now`, with its `residuals` and with `A dv`, `C^T p` in the buffers. `best` is replaced when `now` is
-    /// better. The estimate costs some iterations, so it is made only once the residuals have passed, and after one
-    /// that failed not before the iterations that a geometric fall needs.
+    /// better. The estimate costs some iterations, so it is made only once the residuals have passed, and where the
+    /// ratio of the last one lets expect that it passes.
     pub fn check(
         &mut self,
         task: &Task,
         now: &Iterate,
         residuals: &Residuals,
-        iteration: u32,
         best: &mut Iterate,
         buffers: &mut MeasureBuffers,
         work: &mut Work,
@@ -74,14 +74,13 @@ impl StopTest {
         }
         let tolerance = settings.velocity_tolerance;
         let passed = residuals.contact() <= settings.contact_tolerance && residuals.dynamics <= tolerance;
-        if passed && iteration >= self.wait_until {
-            let error = velocity_error(task, now, residuals, buffers, work);
+        if passed && self.ratio * residuals.dynamics <= tolerance {
+            let error = velocity_error(task, now, residuals, tolerance, buffers, work);
             if error <= tolerance {
                 best.clone_from(now);
                 return Verdict::Converged(error);
             }
-            let missing = (error / tolerance).ln().clamp(0.1, 1.0);
-            self.wait_until = iteration + (f64::from(iteration) * 0.3 * missing) as u32;
+            self.ratio = error / residuals.dynamics.max(f64::MIN_POSITIVE);
         }
         Verdict::Continue
     }

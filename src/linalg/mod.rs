@@ -19,4 +19,4 @@ pub use colouring::{Colouring, colour};
 pub use conjugate_gradient::{GradientBuffers, GradientEnding, conjugate_gradient};
 pub use gauss_seidel::gauss_seidel_sweep;
 pub use incomplete_cholesky::IncompleteCholesky;
-pub use single_precision::{Rounded, SinglePrecision};
+pub use single_precision::{Rounded, SinglePrecision, power_of_two};

@@ -3,17 +3,17 @@
 
 use super::BlockMatrix;
 use crate::math::Vec3;
+use crate::math::quad::{self, Quad};
 use crate::parallel::Par;
-
-/// Three lanes and one of padding, so that four-lane registers apply without any special instruction set.
-type Lanes = [f32; 4];
 
 /// A rounded copy of a block matrix: blocks by columns.
 #[derive(Clone, Debug, Default)]
 pub struct SinglePrecision {
     row_offsets: Vec<u32>,
     columns: Vec<u32>,
-    values: Vec<[Lanes; 3]>,
+    diagonal: Vec<u32>,
+    /// Nine entries a block, by columns, and three of padding at the end: a column is read with the number behind it.
+    values: Vec<f32>,
     /// Power of two that brings the largest entry near 1, so that no unit of mass leaves the range of f32.
     scale: f64,
 }
@@ -21,12 +21,12 @@ pub struct SinglePrecision {
 /// A rounded vector and the power of two that it was divided by.
 #[derive(Clone, Debug, Default)]
 pub struct Rounded {
-    lanes: Vec<Lanes>,
+    lanes: Vec<Quad>,
     scale: f64,
 }
 
 /// The power of two below `x`, or 1 for zero and what is not finite.
-fn power_of_two(x: f64) -> f64 {
+pub fn power_of_two(x: f64) -> f64 {
     if x > 0.0 && x.is_finite() && x.is_normal() { f64::from_bits(x.to_bits() & 0x7FF0_0000_0000_0000) } else { 1.0 }
 }
 
@@ -36,7 +36,7 @@ fn largest(v: &Vec3) -> f64 {
 
 impl SinglePrecision {
     /// Rounds `matrix`. Cost: one pass over the blocks.
-    pub fn new(matrix: &BlockMatrix, par: Par) -> SinglePrecision {
+    pub fn new(matrix: &BlockMatrix) -> SinglePrecision {
         let scale = power_of_two(
             matrix
                 .diagonal
@@ -45,13 +45,15 @@ impl SinglePrecision {
                 .fold(0.0, f64::max),
         );
         let r = 1.0 / scale;
-        let values = par.map_indexed(matrix.values.len(), |k| {
-            let m = &matrix.values[k];
-            let column = |c: usize| [(r * m[0][c]) as f32, (r * m[1][c]) as f32, (r * m[2][c]) as f32, 0.0];
-            [column(0), column(1), column(2)]
-        });
+        let mut values = vec![0.0; 9 * matrix.values.len() + 3];
+        for (out, m) in values.chunks_exact_mut(9).zip(&matrix.values) {
+            for (i, entry) in out.iter_mut().enumerate() {
+                *entry = (r * m[i % 3][i / 3]) as f32;
+            }
+        }
         let row_offsets = matrix.row_offsets.iter().map(|o| *o as u32).collect();
-        SinglePrecision { row_offsets, columns: matrix.columns.clone(), values, scale }
+        let diagonal = matrix.diagonal.iter().map(|d| *d as u32).collect();
+        SinglePrecision { row_offsets, columns: matrix.columns.clone(), diagonal, values, scale }
     }
 
     /// Rounds the vector `f`, relative to its largest entry: increments may be far below the range of f32.
@@ -60,24 +62,50 @@ impl SinglePrecision {
         let v = par.map_indexed(count, f);
         let scale = power_of_two(v.iter().map(largest).fold(0.0, f64::max));
         let r = 1.0 / scale;
-        let lanes = v.iter().map(|v| [(r * v[0]) as f32, (r * v[1]) as f32, (r * v[2]) as f32, 0.0]).collect();
+        let lanes = v.iter().map(|v| quad::round(*v, r)).collect();
         Rounded { lanes, scale }
     }
 
     /// Row `i` of `A x`.
     #[inline]
     pub fn row_product(&self, i: usize, x: &Rounded) -> Vec3 {
-        let mut sums = [0.0f32; 4];
-        let range = self.row_offsets[i] as usize..self.row_offsets[i + 1] as usize;
-        for (column, m) in self.columns[range.clone()].iter().zip(&self.values[range]) {
-            let x = &x.lanes[*column as usize];
-            for lane in 0..4 {
-                sums[lane] += (m[0][lane] * x[0] + m[1][lane] * x[1]) + m[2][lane] * x[2];
-            }
-        }
+        let sums = self.rounded_row_product(i, &x.lanes);
         let s = self.scale * x.scale;
         [s * f64::from(sums[0]), s * f64::from(sums[1]), s * f64::from(sums[2])]
     }
+
+    /// Row `i` of `A x` in units of [`Self::unit`].
+    #[inline(always)]
+    pub fn rounded_row_product(&self, i: usize, x: &[Quad]) -> Quad {
+        let mut sums = Quad::default();
+        let range = self.row_offsets[i] as usize..self.row_offsets[i + 1] as usize;
+        let values = &self.values[9 * range.start..9 * range.end + 3];
+        for (k, column) in self.columns[range].iter().enumerate() {
+            sums = quad::add(sums, quad::combine(&block(values, k), x[*column as usize]));
+        }
+        sums[3] = 0.0;
+        sums
+    }
+
+    /// `D x` for the diagonal block D of row `i`, in units of [`Self::unit`].
+    #[inline(always)]
+    pub fn diagonal_product(&self, i: usize, x: Quad) -> Quad {
+        let mut y = quad::combine(&block(&self.values, self.diagonal[i] as usize), x);
+        y[3] = 0.0;
+        y
+    }
+
+    /// The mass, a power of two, that the rounded entries are relative to.
+    pub fn unit(&self) -> f64 {
+        self.scale
+    }
+}
+
+/// Columns of block `k`; their fourth lanes are not zero.
+#[inline(always)]
+fn block(values: &[f32], k: usize) -> [Quad; 3] {
+    let v = &values[9 * k..9 * k + 12];
+    [[v[0], v[1], v[2], v[3]], [v[3], v[4], v[5], v[6]], [v[6], v[7], v[8], v[9]]]
 }
 
 #[cfg(test)]
@@ -92,7 +120,7 @@ mod tests {
                 BlockMatrix::from_diagonal(&[[[mass, 0.0, 0.0], [0.0, 2.0 * mass, 0.0], [0.0, 0.1 * mass, mass]]; 5]);
             matrix.values[3][0][2] = 0.7 * mass;
             let x: Vec<Vec3> = (0..5).map(|i| [velocity, -0.3 * velocity * f64::from(i), 0.1 * velocity]).collect();
-            let single = SinglePrecision::new(&matrix, Par::Serial);
+            let single = SinglePrecision::new(&matrix);
             let rounded = single.round(x.len(), |i| x[i], Par::Serial);
             for (i, x) in x.iter().enumerate() {
                 let (a, b) = (single.row_product(i, &rounded), mat_vec(&matrix.values[i], *x));

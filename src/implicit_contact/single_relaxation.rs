@@ -1,0 +1,264 @@
+//! Iterations of accelerated relaxation in single precision, on increments from a base that is renewed in double
+//! precision: rounding is relative to what still changes, so it does not limit what is reached.
+
+use super::accelerated_relaxation::{Momentum, Sums};
+use super::residuals::{
+    Iterate, MeasureBuffers, Residuals, Task, Work, contact_residuals, dynamics_residual, near_residuals,
+};
+use super::single_pass::SinglePass;
+use crate::linalg::SinglePrecision;
+use crate::math::quad::{self, Quad, add, add_scaled, combine, multiply, scale, sub};
+use crate::math::simd::{Kernel, run_wide};
+use crate::math::{self, Vec3, mat_scale};
+use crate::parallel::BLOCK;
+
+/// All contacts are screened before every iteration below the first number, then before one in so many.
+const SCREEN: (u32, u32) = (3, 5);
+
+/// State of one block between iterations, increments from the base.
+#[derive(Clone, Copy, Default)]
+struct Node {
+    dv: Quad,
+    a_dv: Quad,
+    z: Quad,
+    a_z: Quad,
+}
+
+/// The state between two measurements.
+pub(super) struct SingleRelaxation<'a, 'b> {
+    task: &'b Task<'a>,
+    contacts: SinglePass<'b>,
+    /// Scale of the metric by block: that of S where the block is coupled, else 1.
+    block_scale: Vec<f32>,
+    /// What increments are relative to; the same rounded.
+    base: Vec<Vec3>,
+    base_rounded: Vec<Quad>,
+    nodes: Vec<Node>,
+    /// Prediction, then `dv'`.
+    u: Vec<Quad>,
+    /// `A dv'`
+    a_u: Vec<Quad>,
+    momentum: Momentum<'b>,
+    iteration: u32,
+    work: Work,
+}
+
+impl<'a, 'b> SingleRelaxation<'a, 'b> {
+    /// Starts from `at` with this scale of the metric.
+    pub fn new(task: &'b Task<'a>, coupled: &'b [bool], at: &Iterate, metric_scale: f64) -> Self {
+        let blocks = at.dv.len();
+        let contacts = SinglePass::new(task.packed, task.problem.rows, task.single.unit(), task.velocity_scale);
+        let mut r = SingleRelaxation {
+            task,
+            contacts,
+            block_scale: Vec::new(),
+            base: at.dv.clone(),
+            base_rounded: Vec::new(),
+            nodes: vec![Node::default(); blocks],
+            u: vec![Quad::default(); blocks],
+            a_u: vec![Quad::default(); blocks],
+            momentum: Momentum::new(coupled, metric_scale),
+            iteration: 0,
+            work: Work::default(),
+        };
+        r.set_scale();
+        r.contacts.start(&at.p, &at.dv);
+        let mut forces = vec![[0.0; 3]; blocks];
+        task.packed.scatter(task.problem.rows, r.contacts.near(), &at.p, &mut forces);
+        r.renew_base();
+        let unit = 1.0 / (task.single.unit() * r.contacts.velocity_unit());
+        let inverse = r.contacts.inverse();
+        task.par.map_into(&mut r.u, |b| {
+            let a = task.problem.matrix.row_product(b, &at.dv);
+            combine(&inverse[b], quad::round(math::sub(forces[b], a), unit))
+        });
+        r.work.blocks += task.problem.matrix.values.len() as u64;
+        r
+    }
+
+    fn set_scale(&mut self) {
+        let source = self.task.problem.inverse_diagonal;
+        let m = &self.momentum;
+        self.contacts
+            .set_metric(self.task.par.map_indexed(source.len(), |b| mat_scale(1.0 / m.block_scale(b), &source[b])));
+        self.block_scale.clear();
+        self.block_scale.extend((0..source.len()).map(|b| m.block_scale(b) as f32));
+    }
+
+    fn renew_base(&mut self) {
+        let unit = 1.0 / self.contacts.velocity_unit();
+        self.base_rounded.clear();
+        self.base_rounded.extend(self.base.iter().map(|v| quad::round(*v, unit)));
+    }
+
+    /// Makes iterations, the last one without extrapolation.
+    pub fn advance(&mut self, iterations: u32, passes: u32) {
+        for i in 1..=iterations {
+            if self.iteration < SCREEN.0 || self.iteration.is_multiple_of(SCREEN.1) {
+                self.screen();
+            }
+            for _ in 0..passes {
+                self.work.contacts += self.contacts.pass(self.task.settings.friction_cone, &mut self.u);
+            }
+            let sums = self.product();
+            if self.momentum.observe(sums) {
+                self.set_scale();
+            }
+            self.iteration += 1;
+            if i < iterations {
+                self.extrapolate(None);
+            }
+        }
+    }
+
+    fn screen(&mut self) {
+        let (base, u) = (&self.base_rounded, &self.u);
+        let v = self.task.par.map_indexed(u.len(), |b| add(base[b], u[b]));
+        self.work.contacts += self.contacts.screen(&v, &self.base);
+    }
+
+    /// `A dv'` and the sums that steer step and momentum.
+    fn product(&mut self) -> Sums {
+        let matrix = self.task.single;
+        let (u, nodes, block_scale) = (&self.u[..], &self.nodes[..], &self.block_scale[..]);
+        let mut tasks: Vec<(usize, &mut [Quad], Sums)> =
+            self.a_u.chunks_mut(BLOCK).enumerate().map(|(i, c)| (i * BLOCK, c, Sums::default())).collect();
+        self.task.par.for_each_task(&mut tasks, |(start, out, sums)| {
+            *sums = run_wide(Product { matrix, u, nodes, block_scale, start: *start, out });
+        });
+        self.work.blocks += self.task.problem.matrix.values.len() as u64;
+        tasks.iter().fold(Sums::default(), |t, (_, _, s)| t.plus(s))
+    }
+
+    /// Puts the iterate into `now`, `A dv'` and `C^T p` into the buffers; returns the residuals. Contacts that are not
+    /// near only count once the others have passed.
+    pub fn measure(&mut self, now: &mut Iterate, buffers: &mut MeasureBuffers) -> Residuals {
+        let Task { problem, packed, settings, par, .. } = *self.task;
+        let unit = self.contacts.velocity_unit();
+        let (base, u) = (&self.base, &self.u);
+        now.dv.resize(u.len(), [0.0; 3]);
+        par.map_into(&mut now.dv, |b| math::add(base[b], quad::widen(u[b], unit)));
+        now.p.resize(packed.contacts.len(), [0.0; 3]);
+        self.contacts.multipliers(settings.friction_cone, &mut now.p);
+        let (dv, list) = (&now.dv, self.contacts.near());
+        buffers.product.resize(dv.len(), [0.0; 3]);
+        problem.matrix.product(dv, &mut buffers.product, par);
+        buffers.contact.clear();
+        buffers.contact.resize(dv.len(), [0.0; 3]);
+        packed.scatter(problem.rows, self.contacts.near(), &now.p, &mut buffers.contact);
+        let mut residuals = near_residuals(self.task, list, dv, &now.p);
+        self.work.contacts += self.contacts.near().len() as u64;
+        self.work.blocks += problem.matrix.values.len() as u64;
+        residuals.dynamics = dynamics_residual(self.task, &buffers.product, &buffers.contact);
+        if residuals.contact() <= settings.contact_tolerance {
+            residuals = Residuals { dynamics: residuals.dynamics, ..contact_residuals(self.task, dv, &now.p) };
+            self.work.contacts += now.p.len() as u64;
+        }
+        residuals
+    }
+
+    /// Continues from what was just measured: the base moves there, and the prediction follows from the exact residual.
+    pub fn renew(&mut self, measured: &Iterate, buffers: &MeasureBuffers) {
+        self.base.clone_from(&measured.dv);
+        self.renew_base();
+        self.contacts.renew(&self.base);
+        for ((node, u), a_u) in self.nodes.iter_mut().zip(&mut self.u).zip(&mut self.a_u) {
+            *node =
+                Node { dv: sub(node.dv, *u), a_dv: sub(node.a_dv, *a_u), z: sub(node.z, *u), a_z: sub(node.a_z, *a_u) };
+            (*u, *a_u) = Default::default();
+        }
+        let unit = 1.0 / (self.task.single.unit() * self.contacts.velocity_unit());
+        let gradient: Vec<Quad> = self
+            .task
+            .par
+            .map_indexed(self.u.len(), |b| quad::round(math::sub(buffers.contact[b], buffers.product[b]), unit));
+        self.extrapolate(Some(&gradient));
+    }
+
+    /// The next prediction. `gradient` is `C^T p - A base` where that is known; else it follows from the prediction that
+    /// was relaxed.
+    fn extrapolate(&mut self, gradient: Option<&[Quad]>) {
+        let (beta, change) = self.momentum.next();
+        let (a_u, inverse) = (&self.a_u[..], self.contacts.inverse());
+        let coupled = self.momentum.coupled;
+        let chunks = self.nodes.chunks_mut(BLOCK).zip(self.u.chunks_mut(BLOCK));
+        let mut tasks: Vec<(usize, &mut [Node], &mut [Quad])> =
+            chunks.enumerate().map(|(i, (nodes, u))| (i * BLOCK, nodes, u)).collect();
+        self.task.par.for_each_task(&mut tasks, |(start, nodes, u)| {
+            let (beta, change) = (beta as f32, change as f32);
+            run_wide(Extrapolate { nodes, u, a_u, inverse, gradient, coupled, beta, change, start: *start });
+        });
+    }
+
+    /// Work so far.
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// Scale of the metric reached.
+    pub fn metric_scale(&self) -> f64 {
+        self.momentum.metric_scale
+    }
+}
+
+struct Product<'a> {
+    matrix: &'a SinglePrecision,
+    u: &'a [Quad],
+    nodes: &'a [Node],
+    block_scale: &'a [f32],
+    start: usize,
+    out: &'a mut [Quad],
+}
+
+impl Kernel for Product<'_> {
+    type Output = Sums;
+    #[inline(always)]
+    fn run(self) -> Sums {
+        let (mut curvature, mut metric, mut turn) = (Quad::default(), Quad::default(), Quad::default());
+        for (i, y) in self.out.iter_mut().enumerate() {
+            let b = self.start + i;
+            let (node, u) = (&self.nodes[b], self.u[b]);
+            *y = self.matrix.rounded_row_product(b, self.u);
+            let e = sub(u, node.z);
+            let se = scale(self.block_scale[b], self.matrix.diagonal_product(b, e));
+            curvature = add(curvature, multiply(e, sub(*y, node.a_z)));
+            metric = add(metric, multiply(e, se));
+            turn = sub(turn, multiply(se, sub(u, node.dv)));
+        }
+        Sums { curvature: quad::total(curvature), metric: quad::total(metric), turn: quad::total(turn) }
+    }
+}
+
+struct Extrapolate<'a> {
+    nodes: &'a mut [Node],
+    u: &'a mut [Quad],
+    a_u: &'a [Quad],
+    inverse: &'a [[Quad; 3]],
+    gradient: Option<&'a [Quad]>,
+    coupled: &'a [bool],
+    beta: f32,
+    change: f32,
+    start: usize,
+}
+
+impl Kernel for Extrapolate<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        for (i, (node, u)) in self.nodes.iter_mut().zip(self.u.iter_mut()).enumerate() {
+            let b = self.start + i;
+            let a_u = self.a_u[b];
+            let z = add_scaled(*u, self.beta, sub(*u, node.dv));
+            let a_z = add_scaled(a_u, self.beta, sub(a_u, node.a_dv));
+            let response = match self.gradient {
+                Some(q) => combine(&self.inverse[b], sub(q[b], a_z)),
+                None => {
+                    let step = scale(if self.coupled[b] { self.change } else { 1.0 }, sub(*u, node.z));
+                    add(step, combine(&self.inverse[b], sub(node.a_z, a_z)))
+                }
+            };
+            *node = Node { dv: *u, a_dv: a_u, z, a_z };
+            *u = add(z, response);
+        }
+    }
+}
