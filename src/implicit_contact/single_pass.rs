@@ -10,8 +10,7 @@ use super::friction::{LocalMetric, project};
 use super::packed_contacts::{PackedContacts, contact_velocity};
 use crate::constraint::RowSet;
 use crate::linalg::power_of_two;
-use crate::math::quad::{self, Quad, add, add_scaled, combine, scale, sub};
-use crate::math::simd::{Kernel, run_wide};
+use crate::math::simd::{Kernel, Quad, run_wide};
 use crate::math::{Mat3, Vec3};
 use crate::model::FrictionCone;
 
@@ -39,11 +38,13 @@ struct Record {
     /// `C base + target`
     target: Quad,
     p: Quad,
+    /// `lambda`
+    pressure: f32,
     /// `G`: nn, n1, n2 and friction; 11, 12, 22 and its largest eigenvalue's inverse.
-    normal: Quad,
-    tangent: Quad,
+    normal: [f32; 4],
+    tangent: [f32; 4],
     /// Inverse of the tangential block (11, 12, 22) and `1 / G_nn`.
-    inverse: Quad,
+    inverse: [f32; 4],
     /// Position in `general`, or `NONE`.
     general: u32,
     /// The contact, and the base that the target belongs to.
@@ -87,7 +88,7 @@ impl<'a> SinglePass<'a> {
             let n = contact.frame[0];
             // What the screen cannot see is always near.
             let target = if contact.general { f32::NEG_INFINITY } else { (contact.target[0] / velocity) as f32 };
-            let plane = [n[0] as f32, n[1] as f32, n[2] as f32, target];
+            let plane = Quad::new([n[0] as f32, n[1] as f32, n[2] as f32, target]);
             Screen { blocks: contact.blocks, weights: contact.weights.map(|w| w as f32), plane }
         });
         SinglePass {
@@ -120,7 +121,7 @@ impl<'a> SinglePass<'a> {
     pub fn set_metric(&mut self, inverse: Vec<Mat3>) {
         let m = self.mass;
         self.inverse.clear();
-        self.inverse.extend(inverse.iter().map(|a| [0, 1, 2].map(|c| quad::round([a[0][c], a[1][c], a[2][c]], m))));
+        self.inverse.extend(inverse.iter().map(|a| [0, 1, 2].map(|c| Quad::round([a[0][c], a[1][c], a[2][c]], m))));
         self.exact_inverse = inverse;
         for i in 0..self.records.len() {
             self.records[i] = self.measured(self.records[i]);
@@ -147,7 +148,8 @@ impl<'a> SinglePass<'a> {
         for (c, p) in p.iter().enumerate() {
             if p[0] > 0.0 {
                 let r = self.record(c, base);
-                self.records[r].p = quad::round(*p, 1.0 / (self.mass * self.velocity));
+                let p = Quad::round(*p, 1.0 / (self.mass * self.velocity));
+                (self.records[r].p, self.records[r].pressure) = (p, p.lanes()[0]);
                 self.near.push(r as u32);
             }
         }
@@ -164,7 +166,7 @@ impl<'a> SinglePass<'a> {
     /// The target of record `r` for this base.
     fn aim(&mut self, r: usize, base: &[Vec3]) {
         let contact = &self.packed.contacts[self.records[r].contact as usize];
-        self.records[r].target = quad::round(contact_velocity(contact, self.rows, base), 1.0 / self.velocity);
+        self.records[r].target = Quad::round(contact_velocity(contact, self.rows, base), 1.0 / self.velocity);
         self.records[r].base = self.bases;
     }
 
@@ -175,12 +177,12 @@ impl<'a> SinglePass<'a> {
             r = self.records.len();
             self.record_of[c] = r as u32;
             let contact = &self.packed.contacts[c];
-            let f = contact.frame.map(|v| quad::round(v, 1.0));
+            let f = contact.frame;
             let mut record = Record {
                 blocks: contact.blocks,
                 weights: contact.weights.map(|w| w as f32),
-                rows: f,
-                columns: [0, 1, 2].map(|axis| [f[0][axis], f[1][axis], f[2][axis], 0.0]),
+                rows: f.map(|v| Quad::round(v, 1.0)),
+                columns: [0, 1, 2].map(|axis| Quad::round([f[0][axis], f[1][axis], f[2][axis]], 1.0)),
                 general: NONE,
                 contact: c as u32,
                 ..Record::default()
@@ -204,7 +206,7 @@ impl<'a> SinglePass<'a> {
         self.near.clear();
         for c in 0..self.screens.len() {
             let r = self.record_of[c];
-            let presses = r != NONE && self.records[r as usize].p[0] > 0.0;
+            let presses = r != NONE && self.records[r as usize].pressure > 0.0;
             if presses || self.screens[c].normal_velocity(v) < 0.0 {
                 let r = self.record(c, base);
                 self.near.push(r as u32);
@@ -218,7 +220,7 @@ impl<'a> SinglePass<'a> {
         let s = self.mass * self.velocity;
         for record in &self.records {
             let c = record.contact as usize;
-            p[c] = project(cone, self.packed.contacts[c].friction, quad::widen(record.p, s));
+            p[c] = project(cone, self.packed.contacts[c].friction, record.p.widen(s));
         }
     }
 
@@ -239,16 +241,16 @@ impl<'a> SinglePass<'a> {
 impl Screen {
     #[inline(always)]
     fn normal_velocity(&self, v: &[Quad]) -> f32 {
-        let n = quad::multiply(seen(&self.blocks, &self.weights, v), self.plane);
-        (n[0] + n[1]) + (n[2] + self.plane[3])
+        let n = (seen(&self.blocks, &self.weights, v) * self.plane).lanes();
+        (n[0] + n[1]) + (n[2] + self.plane.lanes()[3])
     }
 }
 
 #[inline(always)]
 fn seen(blocks: &[u32; 4], weights: &[f32; 4], v: &[Quad]) -> Quad {
-    let first = add_scaled(scale(weights[0], v[blocks[0] as usize]), weights[1], v[blocks[1] as usize]);
-    let second = add_scaled(scale(weights[2], v[blocks[2] as usize]), weights[3], v[blocks[3] as usize]);
-    add(first, second)
+    let first = v[blocks[0] as usize].scaled(weights[0]).add_scaled(weights[1], v[blocks[1] as usize]);
+    let second = v[blocks[2] as usize].scaled(weights[2]).add_scaled(weights[3], v[blocks[3] as usize]);
+    first + second
 }
 
 struct Sweep<'a> {
@@ -281,16 +283,17 @@ impl Record {
         let simple = self.general == NONE;
         let seen = if simple { seen(&self.blocks, &self.weights, u) } else { general[self.general as usize].seen(u) };
         let before = self.p;
-        let w = add(combine(&self.columns, seen), self.target);
-        if before[0] == 0.0 && w[0] >= 0.0 {
+        let w = (Quad::combine(&self.columns, seen) + self.target).lanes();
+        if self.pressure == 0.0 && w[0] >= 0.0 {
             return;
         }
-        self.p = self.step::<DISC>(w);
-        let f = combine(&self.rows, sub(self.p, before));
+        let after = self.step::<DISC>(before.lanes(), w);
+        (self.p, self.pressure) = (Quad::new(after), after[0]);
+        let f = Quad::combine(&self.rows, self.p - before);
         if simple {
             for (b, w) in self.blocks.iter().zip(self.weights) {
                 let b = *b as usize;
-                u[b] = add_scaled(u[b], w, combine(&inverse[b], f));
+                u[b] = u[b].add_scaled(w, Quad::combine(&inverse[b], f));
             }
         } else {
             general[self.general as usize].respond(inverse, f, u);
@@ -299,8 +302,7 @@ impl Record {
 
     /// As [`super::friction::local_step`].
     #[inline(always)]
-    fn step<const DISC: bool>(&self, w: Quad) -> Quad {
-        let p = self.p;
+    fn step<const DISC: bool>(&self, p: [f32; 4], w: [f32; 4]) -> [f32; 4] {
         let lambda = (p[0] - w[0] * self.inverse[3]).max(0.0);
         let bound = self.normal[3] * lambda;
         if bound == 0.0 {
@@ -335,24 +337,24 @@ fn general(rows: &RowSet, i: usize) -> General {
     let angular = rows.angular_offsets[i] as usize..rows.angular_offsets[i + 1] as usize;
     General {
         linear: linear.map(|k| (rows.blocks[k], rows.weights[k] as f32)).collect(),
-        angular: rows.angular[angular].iter().map(|a| (a.block, quad::round(a.lever, 1.0))).collect(),
+        angular: rows.angular[angular].iter().map(|a| (a.block, Quad::round(a.lever, 1.0))).collect(),
     }
 }
 
 impl General {
     fn seen(&self, u: &[Quad]) -> Quad {
-        let linear = self.linear.iter().fold([0.0; 4], |s, (b, w)| add_scaled(s, *w, u[*b as usize]));
-        self.angular.iter().fold(linear, |s, (b, lever)| add(s, quad::cross(u[*b as usize], *lever)))
+        let linear = self.linear.iter().fold(Quad::default(), |s, (b, w)| s.add_scaled(*w, u[*b as usize]));
+        self.angular.iter().fold(linear, |s, (b, lever)| s + u[*b as usize].cross(*lever))
     }
 
     fn respond(&self, inverse: &[[Quad; 3]], f: Quad, u: &mut [Quad]) {
         for (b, w) in &self.linear {
             let b = *b as usize;
-            u[b] = add_scaled(u[b], *w, combine(&inverse[b], f));
+            u[b] = u[b].add_scaled(*w, Quad::combine(&inverse[b], f));
         }
         for (b, lever) in &self.angular {
             let b = *b as usize;
-            u[b] = add(u[b], combine(&inverse[b], quad::cross(*lever, f)));
+            u[b] = u[b] + Quad::combine(&inverse[b], lever.cross(f));
         }
     }
 }

@@ -7,8 +7,7 @@ use super::residuals::{
 };
 use super::single_pass::SinglePass;
 use crate::linalg::SinglePrecision;
-use crate::math::quad::{self, Quad, add, add_scaled, combine, multiply, scale, sub};
-use crate::math::simd::{Kernel, run_wide};
+use crate::math::simd::{Kernel, Quad, run_wide};
 use crate::math::{self, Vec3, mat_scale};
 use crate::parallel::BLOCK;
 
@@ -70,7 +69,7 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
         let inverse = r.contacts.inverse();
         task.par.map_into(&mut r.u, |b| {
             let a = task.problem.matrix.row_product(b, &at.dv);
-            combine(&inverse[b], quad::round(math::sub(forces[b], a), unit))
+            Quad::combine(&inverse[b], Quad::round(math::sub(forces[b], a), unit))
         });
         r.work.blocks += task.problem.matrix.values.len() as u64;
         r
@@ -88,7 +87,7 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
     fn renew_base(&mut self) {
         let unit = 1.0 / self.contacts.velocity_unit();
         self.base_rounded.clear();
-        self.base_rounded.extend(self.base.iter().map(|v| quad::round(*v, unit)));
+        self.base_rounded.extend(self.base.iter().map(|v| Quad::round(*v, unit)));
     }
 
     /// Makes iterations, the last one without extrapolation.
@@ -113,7 +112,7 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
 
     fn screen(&mut self) {
         let (base, u) = (&self.base_rounded, &self.u);
-        let v = self.task.par.map_indexed(u.len(), |b| add(base[b], u[b]));
+        let v = self.task.par.map_indexed(u.len(), |b| base[b] + u[b]);
         self.work.contacts += self.contacts.screen(&v, &self.base);
     }
 
@@ -137,7 +136,7 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
         let unit = self.contacts.velocity_unit();
         let (base, u) = (&self.base, &self.u);
         now.dv.resize(u.len(), [0.0; 3]);
-        par.map_into(&mut now.dv, |b| math::add(base[b], quad::widen(u[b], unit)));
+        par.map_into(&mut now.dv, |b| math::add(base[b], u[b].widen(unit)));
         now.p.resize(packed.contacts.len(), [0.0; 3]);
         self.contacts.multipliers(settings.friction_cone, &mut now.p);
         let (dv, list) = (&now.dv, self.contacts.near());
@@ -163,15 +162,14 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
         self.renew_base();
         self.contacts.renew(&self.base);
         for ((node, u), a_u) in self.nodes.iter_mut().zip(&mut self.u).zip(&mut self.a_u) {
-            *node =
-                Node { dv: sub(node.dv, *u), a_dv: sub(node.a_dv, *a_u), z: sub(node.z, *u), a_z: sub(node.a_z, *a_u) };
+            *node = Node { dv: node.dv - *u, a_dv: node.a_dv - *a_u, z: node.z - *u, a_z: node.a_z - *a_u };
             (*u, *a_u) = Default::default();
         }
         let unit = 1.0 / (self.task.single.unit() * self.contacts.velocity_unit());
         let gradient: Vec<Quad> = self
             .task
             .par
-            .map_indexed(self.u.len(), |b| quad::round(math::sub(buffers.contact[b], buffers.product[b]), unit));
+            .map_indexed(self.u.len(), |b| Quad::round(math::sub(buffers.contact[b], buffers.product[b]), unit));
         self.extrapolate(Some(&gradient));
     }
 
@@ -219,13 +217,13 @@ impl Kernel for Product<'_> {
             let b = self.start + i;
             let (node, u) = (&self.nodes[b], self.u[b]);
             *y = self.matrix.rounded_row_product(b, self.u);
-            let e = sub(u, node.z);
-            let se = scale(self.block_scale[b], self.matrix.diagonal_product(b, e));
-            curvature = add(curvature, multiply(e, sub(*y, node.a_z)));
-            metric = add(metric, multiply(e, se));
-            turn = sub(turn, multiply(se, sub(u, node.dv)));
+            let e = u - node.z;
+            let se = self.matrix.diagonal_product(b, e).scaled(self.block_scale[b]);
+            curvature = curvature + e * (*y - node.a_z);
+            metric = metric + e * se;
+            turn = turn - se * (u - node.dv);
         }
-        Sums { curvature: quad::total(curvature), metric: quad::total(metric), turn: quad::total(turn) }
+        Sums { curvature: curvature.total(), metric: metric.total(), turn: turn.total() }
     }
 }
 
@@ -248,17 +246,17 @@ impl Kernel for Extrapolate<'_> {
         for (i, (node, u)) in self.nodes.iter_mut().zip(self.u.iter_mut()).enumerate() {
             let b = self.start + i;
             let a_u = self.a_u[b];
-            let z = add_scaled(*u, self.beta, sub(*u, node.dv));
-            let a_z = add_scaled(a_u, self.beta, sub(a_u, node.a_dv));
+            let z = u.add_scaled(self.beta, *u - node.dv);
+            let a_z = a_u.add_scaled(self.beta, a_u - node.a_dv);
             let response = match self.gradient {
-                Some(q) => combine(&self.inverse[b], sub(q[b], a_z)),
+                Some(q) => Quad::combine(&self.inverse[b], q[b] - a_z),
                 None => {
-                    let step = scale(if self.coupled[b] { self.change } else { 1.0 }, sub(*u, node.z));
-                    add(step, combine(&self.inverse[b], sub(node.a_z, a_z)))
+                    let step = (*u - node.z).scaled(if self.coupled[b] { self.change } else { 1.0 });
+                    step + Quad::combine(&self.inverse[b], node.a_z - a_z)
                 }
             };
             *node = Node { dv: *u, a_dv: a_u, z, a_z };
-            *u = add(z, response);
+            *u = z + response;
         }
     }
 }

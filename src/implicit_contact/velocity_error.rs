@@ -2,8 +2,7 @@
 
 use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work};
 use crate::linalg::{SinglePrecision, power_of_two};
-use crate::math::quad::{self, Quad, add, add_scaled, combine, multiply};
-use crate::math::simd::{Kernel, run_wide};
+use crate::math::simd::{Kernel, Quad, run_wide};
 use crate::math::{dot, sub};
 use crate::parallel::{BLOCK, Par};
 
@@ -50,9 +49,9 @@ pub(super) fn velocity_error(
         matrix: task.single,
         inverse: task.par.map_indexed(blocks, |b| {
             let a = &task.problem.inverse_diagonal[b];
-            [0, 1, 2].map(|c| quad::round([a[0][c], a[1][c], a[2][c]], mass))
+            [0, 1, 2].map(|c| Quad::round([a[0][c], a[1][c], a[2][c]], mass))
         }),
-        residual: task.par.map_indexed(blocks, |b| quad::round(sub(contact[b], product[b]), 1.0 / unit)),
+        residual: task.par.map_indexed(blocks, |b| Quad::round(sub(contact[b], product[b]), 1.0 / unit)),
         preconditioned: vec![Quad::default(); blocks],
         direction: vec![Quad::default(); blocks],
         image: vec![Quad::default(); blocks],
@@ -146,7 +145,7 @@ impl Kernel for Turn<'_> {
     #[inline(always)]
     fn run(self) {
         for (d, z) in self.d.iter_mut().zip(self.z) {
-            *d = add_scaled(*z, self.beta, *d);
+            *d = z.add_scaled(self.beta, *d);
         }
     }
 }
@@ -165,9 +164,9 @@ impl Kernel for Image<'_> {
         let mut sum = Quad::default();
         for (i, y) in self.out.iter_mut().enumerate() {
             *y = self.matrix.rounded_row_product(self.start + i, self.d);
-            sum = add(sum, multiply(self.d[self.start + i], *y));
+            sum = sum + self.d[self.start + i] * *y;
         }
-        quad::total(sum)
+        sum.total()
     }
 }
 
@@ -185,11 +184,11 @@ impl Kernel for &mut Descend<'_> {
     fn run(self) -> f64 {
         let mut sum = Quad::default();
         for (i, (r, z)) in self.r.iter_mut().zip(self.z.iter_mut()).enumerate() {
-            *r = add_scaled(*r, -self.alpha, self.image[i]);
-            *z = combine(&self.inverse[i], *r);
-            sum = add(sum, multiply(*r, *z));
+            *r = r.add_scaled(-self.alpha, self.image[i]);
+            *z = Quad::combine(&self.inverse[i], *r);
+            sum = sum + *r * *z;
         }
-        quad::total(sum)
+        sum.total()
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::BlockMatrix;
 use crate::math::Vec3;
-use crate::math::quad::{self, Quad};
+use crate::math::simd::Quad;
 use crate::parallel::Par;
 
 /// A rounded copy of a block matrix: blocks by columns.
@@ -12,8 +12,8 @@ pub struct SinglePrecision {
     row_offsets: Vec<u32>,
     columns: Vec<u32>,
     diagonal: Vec<u32>,
-    /// Nine entries a block, by columns, and three of padding at the end: a column is read with the number behind it.
-    values: Vec<f32>,
+    /// Blocks by columns.
+    values: Vec<[f32; 9]>,
     /// Power of two that brings the largest entry near 1, so that no unit of mass leaves the range of f32.
     scale: f64,
 }
@@ -45,8 +45,8 @@ impl SinglePrecision {
                 .fold(0.0, f64::max),
         );
         let r = 1.0 / scale;
-        let mut values = vec![0.0; 9 * matrix.values.len() + 3];
-        for (out, m) in values.chunks_exact_mut(9).zip(&matrix.values) {
+        let mut values = vec![[0.0; 9]; matrix.values.len()];
+        for (out, m) in values.iter_mut().zip(&matrix.values) {
             for (i, entry) in out.iter_mut().enumerate() {
                 *entry = (r * m[i % 3][i / 3]) as f32;
             }
@@ -62,7 +62,7 @@ impl SinglePrecision {
         let v = par.map_indexed(count, f);
         let scale = power_of_two(v.iter().map(largest).fold(0.0, f64::max));
         let r = 1.0 / scale;
-        let lanes = v.iter().map(|v| quad::round(*v, r)).collect();
+        let lanes = v.iter().map(|v| Quad::round(*v, r)).collect();
         Rounded { lanes, scale }
     }
 
@@ -70,8 +70,7 @@ impl SinglePrecision {
     #[inline]
     pub fn row_product(&self, i: usize, x: &Rounded) -> Vec3 {
         let sums = self.rounded_row_product(i, &x.lanes);
-        let s = self.scale * x.scale;
-        [s * f64::from(sums[0]), s * f64::from(sums[1]), s * f64::from(sums[2])]
+        sums.widen(self.scale * x.scale)
     }
 
     /// Row `i` of `A x` in units of [`Self::unit`].
@@ -79,33 +78,22 @@ impl SinglePrecision {
     pub fn rounded_row_product(&self, i: usize, x: &[Quad]) -> Quad {
         let mut sums = Quad::default();
         let range = self.row_offsets[i] as usize..self.row_offsets[i + 1] as usize;
-        let values = &self.values[9 * range.start..9 * range.end + 3];
-        for (k, column) in self.columns[range].iter().enumerate() {
-            sums = quad::add(sums, quad::combine(&block(values, k), x[*column as usize]));
+        for (m, column) in self.values[range.clone()].iter().zip(&self.columns[range]) {
+            sums = sums + Quad::combine_packed(m, x[*column as usize]);
         }
-        sums[3] = 0.0;
-        sums
+        sums.padded()
     }
 
     /// `D x` for the diagonal block D of row `i`, in units of [`Self::unit`].
     #[inline(always)]
     pub fn diagonal_product(&self, i: usize, x: Quad) -> Quad {
-        let mut y = quad::combine(&block(&self.values, self.diagonal[i] as usize), x);
-        y[3] = 0.0;
-        y
+        Quad::combine_packed(&self.values[self.diagonal[i] as usize], x).padded()
     }
 
     /// The mass, a power of two, that the rounded entries are relative to.
     pub fn unit(&self) -> f64 {
         self.scale
     }
-}
-
-/// Columns of block `k`; their fourth lanes are not zero.
-#[inline(always)]
-fn block(values: &[f32], k: usize) -> [Quad; 3] {
-    let v = &values[9 * k..9 * k + 12];
-    [[v[0], v[1], v[2], v[3]], [v[3], v[4], v[5], v[6]], [v[6], v[7], v[8], v[9]]]
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 //! * `simd`: several numbers at once, with the same bits on every processor
 //! * `vector`: three-vectors and 3x3 matrices as plain arrays
 //! * `singular_values`: eigenvectors, singular values with rotations
-//! * `quad`: three-vectors in f32, padded to four lanes
 //! * `predicates`: exact signs of determinants
 //! * `integer`: integers of any length, short ones without the heap
 //! * `integer_polynomial`: exact roots and signs, for the rare cases that floating point leaves open
@@ -11,7 +10,6 @@
 mod integer;
 mod integer_polynomial;
 pub mod predicates;
-pub mod quad;
 pub mod simd;
 mod singular_values;
 mod vector;

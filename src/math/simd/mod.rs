@@ -1,9 +1,12 @@
 //! Several numbers at once, with the same answers and the same bits on every processor.
 //!
 //! * `eight`: eight boxes against one, one bit a lane, and pairs from such bits
+//! * `quad`: three-vectors in f32
 //! * `lanes`: a few doubles side by side, and kernels compiled once more for wide instructions
 
 mod eight;
 mod lanes;
+mod quad;
 pub use eight::{Eight, EightKernel, run_eight};
 pub use lanes::{Kernel, Lanes, run_wide};
+pub use quad::Quad;
