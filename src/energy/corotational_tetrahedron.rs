@@ -98,7 +98,7 @@ impl Stencil<4> for CorotationalTetrahedron {
     }
 
     /// Exact: the derivative of the rotation included; undefined where two singular values cancel (inverted far).
-    /// Projected: the three twist modes, the only ones that can be negative, are cut at zero [Smith19].
+    /// Projected: the three twist modes, the only ones that can be negative, are cut at zero [Smith19, twist modes].
     fn hessian(&self, x: &[Vec3; 4], form: HessianForm) -> Blocks<4> {
         let d = self.deformation(x);
         let (u, v) = (transpose(&d.parts.u), transpose(&d.parts.v));

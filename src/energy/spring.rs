@@ -35,7 +35,7 @@ impl Stencil<2> for Spring {
         [f, scale(-1.0, f)]
     }
 
-    /// Projected: the part across the spring, negative under compression, is left out there [Choi02].
+    /// Projected: the part across the spring, negative under compression, is left out there [Choi02, compression].
     fn hessian(&self, x: &[Vec3; 2], form: HessianForm) -> Blocks<2> {
         let along = sub(x[1], x[0]);
         let Some(direction) = unit(along) else { return zero_blocks() };

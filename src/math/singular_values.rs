@@ -61,7 +61,7 @@ fn rotate(a: &mut Mat3, v: &mut Mat3, p: usize, q: usize) {
 }
 
 /// `F = U diag(sigma) V^T` with rotations `U` and `V`: `sigma[0] >= sigma[1] >= |sigma[2]|`, the last one negative where
-/// `F` inverts [Irving04].
+/// `F` inverts [Irving04, inversion].
 #[derive(Clone, Copy, Debug)]
 pub struct SignedSingularValues {
     /// Left rotation.

@@ -10,7 +10,7 @@
 //! 5. *Integers*: `exact` decides what is left: grazing contact, contact at an end of the step, pairs that stay
 //!    coplanar.
 //!
-//! *Work.* Parts 1 to 3 are bounded by [`MAX_PARTS`] parts and [`super::roots::MAX_ITERATIONS`] evaluations for each root, part 4 by
+//! *Work.* Parts 1 to 3 are bounded by [`MAX_PARTS`] parts and `roots::MAX_ITERATIONS` evaluations for each root, part 4 by
 //! [`SEPARATION_INTERVALS`], part 5 as stated there.
 
 use super::coplanarity::{Frame, axis_gap, plane_gap};
