@@ -237,6 +237,16 @@
 #define SGN_FORMAT_U64X3 13
 
 /**
+ * `uint32_t[4]`
+ */
+#define SGN_FORMAT_U32X4 14
+
+/**
+ * `uint64_t[4]`
+ */
+#define SGN_FORMAT_U64X4 15
+
+/**
  * `float`
  */
 #define SGN_FORMAT_F32 20
@@ -413,12 +423,17 @@
 #define SGN_BODY_POSED 4
 
 /**
- * Free vertices, driven by the host.
+ * Flag of a rigid body: the library drives it, under gravity and its gyroscopic torque.
+ */
+#define SGN_BODY_MODEL_DRIVEN 32
+
+/**
+ * Nodes: free vertices, a sheet, or a solid of tetrahedra.
  */
 #define SGN_BODY_KIND_DEFORMABLE 1
 
 /**
- * Rigid, driven by the host.
+ * Rigid.
  */
 #define SGN_BODY_KIND_RIGID 2
 
@@ -438,6 +453,26 @@
 #define SGN_BODY_KIND_HALF_SPACE 5
 
 /**
+ * Flag of a sheet: flat at rest, whatever the rest shape.
+ */
+#define SGN_BODY_FLAT 8
+
+/**
+ * Flag of a solid: the host drives its nodes. Of the material only the density is used.
+ */
+#define SGN_BODY_HOST_DRIVEN 16
+
+/**
+ * Constant-strain triangles, and bending at the edges. The default.
+ */
+#define SGN_SHEET_SHELL 0
+
+/**
+ * Springs along the edges and, with `bend_ratio`, across them.
+ */
+#define SGN_SHEET_MASS_SPRING 1
+
+/**
  * Positions, n vectors. Push: start positions of a deformable body or a kinematic mesh. Pull: where the vertices of any
  * mesh stand; certified after a step, and only in the body's own precision.
  */
@@ -454,8 +489,9 @@
 #define SGN_SLOT_HALF_SPACE 3
 
 /**
- * Push: displacement velocity `v* = (x* - x0)/dt`, n vectors of a deformable body, one of a rigid body. It stays until the
- * next push. Pull: `(x1 - x0)/dt` of the last step.
+ * Push: displacement velocity `v* = (x* - x0)/dt`, m vectors of a deformable body, one of a rigid body. It stays until the
+ * next push. Of a body that the library drives: the velocity at the start of the next step. Pull: `(x1 - x0)/dt` of the
+ * last step.
  */
 #define SGN_SLOT_VELOCITY 4
 
@@ -476,7 +512,7 @@
 #define SGN_SLOT_END_ANGULAR_VELOCITY 7
 
 /**
- * Pull only: contact impulse over the last step, n vectors or one.
+ * Pull only: contact impulse over the last step, m vectors or one.
  */
 #define SGN_SLOT_IMPULSE 8
 
@@ -486,7 +522,8 @@
 #define SGN_SLOT_ANGULAR_IMPULSE 9
 
 /**
- * Push only: where a kinematic mesh ends the next step, n vectors. Without a push it stays.
+ * Push only: where a kinematic mesh ends the next step, n vectors; where the pinned nodes of a body that the library
+ * drives do, m vectors, of which only theirs are read. Without a push they stay.
  */
 #define SGN_SLOT_TARGET_POSITION 10
 
@@ -501,12 +538,12 @@
 #define SGN_SLOT_TARGET_HALF_SPACE 12
 
 /**
- * Push only: lumped masses, n of a deformable body, one of a rigid body, F32 or F64.
+ * Push only: lumped masses, m of a deformable body, one of a rigid body, F32 or F64.
  */
 #define SGN_SLOT_MASS 13
 
 /**
- * Push only: pin flags of a deformable body, n U8.
+ * Push only: pin flags of a deformable body, m U8.
  */
 #define SGN_SLOT_PINNED 14
 
@@ -526,7 +563,19 @@
 #define SGN_SLOT_EDGES 17
 
 /**
- * Flag of a push of POSITION, POSE or HALF_SPACE: the body jumps there. Without it the way from the state that the last
+ * Positions of the nodes of a deformable body, m vectors. Push and pull as POSITION, which a solid that carries a surface
+ * has for pulling only.
+ */
+#define SGN_SLOT_NODE_POSITION 18
+
+/**
+ * Push only: where the attachments of a body that the library drives pull at the end of the next step, a vector each. Until
+ * the next push they stay.
+ */
+#define SGN_SLOT_ATTACHMENT_TARGET 19
+
+/**
+ * Flag of a push of POSITION, NODE_POSITION, POSE or HALF_SPACE: the body jumps there. Without it the way from the state that the last
  * step left is checked by the next step, so that nothing passes through anything between steps.
  */
 #define SGN_PUSH_TELEPORT 1
@@ -1104,7 +1153,7 @@ typedef struct SgnDeformableDesc {
 } SgnDeformableDesc;
 
 /**
- * A rigid body whose dynamics are the host's: a mesh or a shape. Fill with `sgn_rigid_desc_init`.
+ * A rigid body, a mesh or a shape, driven by the host or, with `SGN_BODY_MODEL_DRIVEN`, by the library. Fill with `sgn_rigid_desc_init`.
  */
 typedef struct SgnRigidDesc {
   /**
@@ -1144,13 +1193,21 @@ typedef struct SgnRigidDesc {
    */
   double orientation[4];
   /**
-   * Displacement velocity of the centre of mass. Default: 0.
+   * Displacement velocity of the centre of mass; the velocity at the start if the library drives it. Default: 0.
    */
   double velocity[3];
   /**
-   * Angular displacement velocity, world axes, radians per time. Default: 0.
+   * Angular displacement velocity, world axes, radians per time; likewise. Default: 0.
    */
   double angular_velocity[3];
+  /**
+   * Rate at which the velocity decays; read with MODEL_DRIVEN. Default: 0.
+   */
+  double linear_damping;
+  /**
+   * Rate at which the angular velocity decays; read with MODEL_DRIVEN. Default: 0.
+   */
+  double angular_damping;
 } SgnRigidDesc;
 
 /**
@@ -1232,7 +1289,7 @@ typedef struct SgnBodyInfo {
    */
   SgnBodyKind kind;
   /**
-   * Number of vertices.
+   * Number of vertices: of a solid that carries a surface, those of the surface.
    */
   uint64_t vertices;
   /**
@@ -1244,7 +1301,8 @@ typedef struct SgnBodyInfo {
    */
   uint64_t triangles;
   /**
-   * Entries of its velocities and impulses: its vertices, or 1 for a rigid body, or 0.
+   * Entries of its velocities and impulses: its nodes (its vertices, or those of the tetrahedra that carry them), or 1
+   * for a rigid body, or 0.
    */
   uint64_t velocities;
   /**
@@ -1268,7 +1326,185 @@ typedef struct SgnBodyId {
 } SgnBodyId;
 
 /**
- * What of a body is pushed or pulled. `n` is its number of vertices; vectors are F32X3 or F64X3.
+ * How a sheet resists stretch and shear.
+ */
+typedef int32_t SgnSheetModel;
+
+/**
+ * What acts on the nodes of a body that the library drives, besides its material. Frozen, like `SgnView`.
+ */
+typedef struct SgnNodeForces {
+  /**
+   * Velocities at the start, F32X3 or F64X3, one per node; empty: zero.
+   */
+  struct SgnView velocities;
+  /**
+   * U8 per node: not 0 where the node goes to its TARGET_POSITION and nowhere else. Empty: none does.
+   */
+  struct SgnView pinned;
+  /**
+   * Springs between nodes besides those of the material, U32X2 or U64X2; at rest at their rest distance.
+   */
+  struct SgnView springs;
+  /**
+   * Their stiffnesses, F32 or F64, in force per length.
+   */
+  struct SgnView spring_stiffness;
+  /**
+   * Nodes that a spring pulls to a target, U32 or U64; each target starts where its node starts.
+   */
+  struct SgnView attachments;
+  /**
+   * Their stiffnesses, F32 or F64.
+   */
+  struct SgnView attachment_stiffness;
+  /**
+   * Their damping, F32 or F64, in force per velocity; empty: none.
+   */
+  struct SgnView attachment_damping;
+  /**
+   * Drag of the faces in the wind: density of the air times drag coefficient over 2. Default: 0.
+   */
+  double drag;
+  /**
+   * Rate at which every velocity decays. Default: 0.
+   */
+  double mass_damping;
+  /**
+   * Time that multiplies the stiffness of stretch, shear and volume as damping. Default: 0.
+   */
+  double stretch_damping_time;
+  /**
+   * Time that multiplies the stiffness of bending as damping. Default: 0.
+   */
+  double bending_damping_time;
+} SgnNodeForces;
+
+/**
+ * Cloth or a shell that the library drives. Fill with `sgn_sheet_desc_init`.
+ */
+typedef struct SgnSheetDesc {
+  /**
+   * Set by the init function.
+   */
+  uint32_t struct_size;
+  /**
+   * An `SGN_PRECISION_` constant. Default: F64.
+   */
+  SgnPrecision precision;
+  /**
+   * What all bodies have in common. Flags: NO_SELF_COLLISION, FLAT.
+   */
+  struct SgnBodyOptions options;
+  /**
+   * The mesh at its start positions; its triangles are the sheet. Every vertex is a node.
+   */
+  struct SgnMesh mesh;
+  /**
+   * Rest positions, as many as vertices; empty: the start positions.
+   */
+  struct SgnView rest_positions;
+  /**
+   * An `SGN_SHEET_` constant. Default: SHELL.
+   */
+  SgnSheetModel model;
+  /**
+   * Must be 0.
+   */
+  uint32_t reserved;
+  /**
+   * Mass per volume, positive. Default: 200.
+   */
+  double density;
+  /**
+   * Thickness of the material, positive; not that of contact, which is in the options. Default: 0.001.
+   */
+  double thickness;
+  /**
+   * Young's modulus, positive. Default: 1e6.
+   */
+  double young_modulus;
+  /**
+   * Poisson's ratio, at least 0 and below 0.5; springs have none. Default: 0.3.
+   */
+  double poisson_ratio;
+  /**
+   * Bending stiffness, a torque; negative: that of a plate for a shell, none for springs. Default: -1.
+   */
+  double bending_stiffness;
+  /**
+   * Stiffness of a spring across an edge over that of the edge's own; springs only. Default: 0.01.
+   */
+  double bend_ratio;
+  /**
+   * Rest lengths over those of the rest shape, positive. Default: 1.
+   */
+  double rest_scale;
+  /**
+   * What else acts on it.
+   */
+  struct SgnNodeForces forces;
+} SgnSheetDesc;
+
+/**
+ * A solid of tetrahedra, with its own boundary or with a surface that it carries. Fill with `sgn_solid_desc_init`.
+ */
+typedef struct SgnSolidDesc {
+  /**
+   * Set by the init function.
+   */
+  uint32_t struct_size;
+  /**
+   * An `SGN_PRECISION_` constant. Default: F64.
+   */
+  SgnPrecision precision;
+  /**
+   * What all bodies have in common. Flags: NO_SELF_COLLISION, HOST_DRIVEN.
+   */
+  struct SgnBodyOptions options;
+  /**
+   * Start positions of the nodes, F32X3 or F64X3.
+   */
+  struct SgnView nodes;
+  /**
+   * Rest positions of the nodes, as many; empty: the start positions.
+   */
+  struct SgnView rest_positions;
+  /**
+   * Tetrahedra, U32X4 or U64X4, either orientation. Every node belongs to one.
+   */
+  struct SgnView tetrahedra;
+  /**
+   * A mesh in the rest shape that the tetrahedra carry and that collides for them: each vertex moves with the element
+   * that holds it, or the nearest. Empty: the boundary of the tetrahedra collides.
+   */
+  struct SgnMesh surface;
+  /**
+   * Mass per volume, positive. Default: 1000.
+   */
+  double density;
+  /**
+   * Young's modulus, positive. Default: 1e6.
+   */
+  double young_modulus;
+  /**
+   * Poisson's ratio, at least 0 and below 0.5. Default: 0.3.
+   */
+  double poisson_ratio;
+  /**
+   * Rest lengths over those of the rest shape, positive. Default: 1.
+   */
+  double rest_scale;
+  /**
+   * What else acts on it. With HOST_DRIVEN: velocities are displacement velocities, pins follow them, the rest must be
+   * empty.
+   */
+  struct SgnNodeForces forces;
+} SgnSolidDesc;
+
+/**
+ * What of a body is pushed or pulled. `n` is its number of vertices, `m` that of its nodes (`velocities` of
+ * `sgn_body_info`): the same, but for a solid that carries a surface. Vectors are F32X3 or F64X3.
  */
 typedef int32_t SgnSlot;
 
@@ -1522,7 +1758,7 @@ typedef struct SgnStepReport {
    */
   double search_microseconds;
   /**
-   * Microseconds of rows, frames and metric.
+   * Microseconds of rows and frames.
    */
   double rows_microseconds;
   /**
@@ -1549,6 +1785,10 @@ typedef struct SgnStepReport {
    * Bytes held by the method's memory and buffers.
    */
   uint64_t bytes;
+  /**
+   * Microseconds of the metric, and of assembly and unconstrained solve of the bodies that the library drives.
+   */
+  double dynamics_microseconds;
 } SgnStepReport;
 
 /**
@@ -1815,6 +2055,30 @@ typedef struct SgnApi {
    * See `sgn_world_snapshot_load`.
    */
   SgnResult (*world_snapshot_load)(struct SgnWorld *world, const void *buffer, uint64_t size);
+  /**
+   * See `sgn_sheet_desc_init`.
+   */
+  SgnResult (*sheet_desc_init)(struct SgnSheetDesc *desc, size_t size);
+  /**
+   * See `sgn_solid_desc_init`.
+   */
+  SgnResult (*solid_desc_init)(struct SgnSolidDesc *desc, size_t size);
+  /**
+   * See `sgn_sheet_create`.
+   */
+  SgnResult (*sheet_create)(struct SgnWorld *world, const struct SgnSheetDesc *desc, struct SgnBodyId *out);
+  /**
+   * See `sgn_solid_create`.
+   */
+  SgnResult (*solid_create)(struct SgnWorld *world, const struct SgnSolidDesc *desc, struct SgnBodyId *out);
+  /**
+   * See `sgn_world_set_gravity`.
+   */
+  SgnResult (*world_set_gravity)(struct SgnWorld *world, const double *gravity);
+  /**
+   * See `sgn_world_set_wind`.
+   */
+  SgnResult (*world_set_wind)(struct SgnWorld *world, const double *wind);
 } SgnApi;
 
 /**
@@ -2104,6 +2368,55 @@ SGN_API
 SgnResult sgn_body_info(const struct SgnWorld *world,
                         struct SgnBodyId body,
                         struct SgnBodyInfo *info);
+
+/**
+ * Fills `desc` with defaults; `size` is `sizeof(SgnSheetDesc)`.
+ *
+ * Thread: any. Errors: NULL_ARGUMENT, BAD_STRUCT.
+ */
+SGN_API SgnResult sgn_sheet_desc_init(struct SgnSheetDesc *desc, size_t size);
+
+/**
+ * Fills `desc` with defaults; `size` is `sizeof(SgnSolidDesc)`.
+ *
+ * Thread: any. Errors: NULL_ARGUMENT, BAD_STRUCT.
+ */
+SGN_API SgnResult sgn_solid_desc_init(struct SgnSolidDesc *desc, size_t size);
+
+/**
+ * Adds cloth or a shell that the library drives: a deformable body with dynamics of its own.
+ *
+ * Ownership, thread, errors: as sgn_deformable_create.
+ */
+SGN_API
+SgnResult sgn_sheet_create(struct SgnWorld *world,
+                           const struct SgnSheetDesc *desc,
+                           struct SgnBodyId *out);
+
+/**
+ * Adds a solid of tetrahedra: a deformable body, driven by the library or, with HOST_DRIVEN, by the host, whose
+ * velocities, impulses and system rows are those of the nodes.
+ *
+ * Ownership, thread, errors: as sgn_deformable_create.
+ */
+SGN_API
+SgnResult sgn_solid_create(struct SgnWorld *world,
+                           const struct SgnSolidDesc *desc,
+                           struct SgnBodyId *out);
+
+/**
+ * Sets the acceleration of gravity on the bodies that the library drives: three doubles. Zero at first.
+ *
+ * Thread: exclusive. Errors (it then stays): NULL_ARGUMENT, NON_FINITE_INPUT, BUSY, POISONED, PANIC.
+ */
+SGN_API SgnResult sgn_world_set_gravity(struct SgnWorld *world, const double *gravity);
+
+/**
+ * Sets the velocity of the air around the bodies that the library drives: three doubles. Zero at first.
+ *
+ * Thread: exclusive. Errors (it then stays): NULL_ARGUMENT, NON_FINITE_INPUT, BUSY, POISONED, PANIC.
+ */
+SGN_API SgnResult sgn_world_set_wind(struct SgnWorld *world, const double *wind);
 
 /**
  * Pushes a slot of a body from the host's memory.

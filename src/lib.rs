@@ -15,6 +15,7 @@
 //! | [`detection`] | broad phase, proximity, continuous detection, intersection certificate |
 //! | [`kinematics`] | poses and the map from degrees of freedom to vertices |
 //! | [`model`] | model, state, settings, reports |
+//! | [`dynamics`] | assembly and the unconstrained step of the bodies that the library drives |
 //! | [`contact_search`] | contacts with body ids and persistent keys |
 //! | [`constraint`] | contacts as rows over the degrees of freedom |
 //! | [`fail_safe`] | rigid zones and hold |
@@ -29,6 +30,7 @@ pub mod capi;
 pub mod constraint;
 pub mod contact_search;
 pub mod detection;
+pub mod dynamics;
 pub mod energy;
 pub mod fail_safe;
 pub mod geometry;

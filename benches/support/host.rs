@@ -122,6 +122,8 @@ impl Plan {
             mask: 1,
             self_collision: self.self_collision,
             precision: Precision::Double,
+            embedding: None,
+            dynamics: None,
         };
         for (number, (range, faces)) in self.elastic_bodies.iter().enumerate() {
             let local = faces.iter().map(|f| f.map(|v| v - range.start as u32)).collect();

@@ -34,6 +34,8 @@ inline Status init(SgnWorldDesc &s) noexcept { return sgn_world_desc_init(&s, si
 inline Status init(SgnMaterialDesc &s) noexcept { return sgn_material_desc_init(&s, sizeof s); }
 inline Status init(SgnShapeDesc &s) noexcept { return sgn_shape_desc_init(&s, sizeof s); }
 inline Status init(SgnDeformableDesc &s) noexcept { return sgn_deformable_desc_init(&s, sizeof s); }
+inline Status init(SgnSheetDesc &s) noexcept { return sgn_sheet_desc_init(&s, sizeof s); }
+inline Status init(SgnSolidDesc &s) noexcept { return sgn_solid_desc_init(&s, sizeof s); }
 inline Status init(SgnRigidDesc &s) noexcept { return sgn_rigid_desc_init(&s, sizeof s); }
 inline Status init(SgnKinematicDesc &s) noexcept { return sgn_kinematic_desc_init(&s, sizeof s); }
 inline Status init(SgnHalfSpaceDesc &s) noexcept { return sgn_half_space_desc_init(&s, sizeof s); }
@@ -160,10 +162,14 @@ class World {
 
   Status add(const SgnMaterialDesc &desc, SgnMaterialId &id) noexcept { return sgn_material_create(world_, &desc, &id); }
   Status add(const SgnDeformableDesc &desc, SgnBodyId &id) noexcept { return sgn_deformable_create(world_, &desc, &id); }
+  Status add(const SgnSheetDesc &desc, SgnBodyId &id) noexcept { return sgn_sheet_create(world_, &desc, &id); }
+  Status add(const SgnSolidDesc &desc, SgnBodyId &id) noexcept { return sgn_solid_create(world_, &desc, &id); }
   Status add(const SgnRigidDesc &desc, SgnBodyId &id) noexcept { return sgn_rigid_create(world_, &desc, &id); }
   Status add(const SgnKinematicDesc &desc, SgnBodyId &id) noexcept { return sgn_kinematic_create(world_, &desc, &id); }
   Status add(const SgnHalfSpaceDesc &desc, SgnBodyId &id) noexcept { return sgn_half_space_create(world_, &desc, &id); }
   Status add(const SgnSystemDesc &desc, SgnSystemId &id) noexcept { return sgn_system_create(world_, &desc, &id); }
+  Status set_gravity(const std::array<double, 3> &g) noexcept { return sgn_world_set_gravity(world_, g.data()); }
+  Status set_wind(const std::array<double, 3> &w) noexcept { return sgn_world_set_wind(world_, w.data()); }
   Status remove(SgnBodyId id) noexcept { return sgn_body_destroy(world_, id); }
   Status remove(SgnSystemId id) noexcept { return sgn_system_destroy(world_, id); }
 

@@ -7,8 +7,8 @@ use super::version::SGN_ABI_VERSION;
 use super::{
     SgnBodyId, SgnBodyInfo, SgnCapability, SgnCheckReport, SgnContactAttribute, SgnContext, SgnContextDesc,
     SgnDeformableDesc, SgnErrorInfo, SgnHalfSpaceDesc, SgnKinematicDesc, SgnMaterialDesc, SgnMaterialId, SgnResult,
-    SgnRigidDesc, SgnShapeDesc, SgnSlot, SgnStepDesc, SgnStepReport, SgnSystemDesc, SgnSystemId, SgnVersion, SgnView,
-    SgnViewMut, SgnWitnessAttribute, SgnWorld, SgnWorldDesc,
+    SgnRigidDesc, SgnShapeDesc, SgnSheetDesc, SgnSlot, SgnSolidDesc, SgnStepDesc, SgnStepReport, SgnSystemDesc,
+    SgnSystemId, SgnVersion, SgnView, SgnViewMut, SgnWitnessAttribute, SgnWorld, SgnWorldDesc,
 };
 use std::ffi::{c_char, c_void};
 
@@ -184,12 +184,26 @@ pub struct SgnApi {
     /// See `sgn_world_snapshot_load`.
     pub world_snapshot_load:
         Option<unsafe extern "C" fn(world: *mut SgnWorld, buffer: *const c_void, size: u64) -> SgnResult>,
+    /// See `sgn_sheet_desc_init`.
+    pub sheet_desc_init: Option<unsafe extern "C" fn(desc: *mut SgnSheetDesc, size: usize) -> SgnResult>,
+    /// See `sgn_solid_desc_init`.
+    pub solid_desc_init: Option<unsafe extern "C" fn(desc: *mut SgnSolidDesc, size: usize) -> SgnResult>,
+    /// See `sgn_sheet_create`.
+    pub sheet_create:
+        Option<unsafe extern "C" fn(world: *mut SgnWorld, desc: *const SgnSheetDesc, out: *mut SgnBodyId) -> SgnResult>,
+    /// See `sgn_solid_create`.
+    pub solid_create:
+        Option<unsafe extern "C" fn(world: *mut SgnWorld, desc: *const SgnSolidDesc, out: *mut SgnBodyId) -> SgnResult>,
+    /// See `sgn_world_set_gravity`.
+    pub world_set_gravity: Option<unsafe extern "C" fn(world: *mut SgnWorld, gravity: *const f64) -> SgnResult>,
+    /// See `sgn_world_set_wind`.
+    pub world_set_wind: Option<unsafe extern "C" fn(world: *mut SgnWorld, wind: *const f64) -> SgnResult>,
 }
 
 // SAFETY: repr(C) without padding; numbers and nullable function pointers.
 unsafe impl Growing for SgnApi {
     const NAME: &'static str = "SgnApi";
-    const FIRST_SIZE: usize = 384;
+    const FIRST_SIZE: usize = 432;
     fn defaults() -> Self {
         // SAFETY: all zero is a valid table of no functions.
         unsafe { std::mem::zeroed() }
@@ -272,4 +286,10 @@ const TABLE: SgnApi = SgnApi {
     world_snapshot_size: Some(super::sgn_world_snapshot_size),
     world_snapshot_save: Some(super::sgn_world_snapshot_save),
     world_snapshot_load: Some(super::sgn_world_snapshot_load),
+    sheet_desc_init: Some(super::sgn_sheet_desc_init),
+    solid_desc_init: Some(super::sgn_solid_desc_init),
+    sheet_create: Some(super::sgn_sheet_create),
+    solid_create: Some(super::sgn_solid_create),
+    world_set_gravity: Some(super::sgn_world_set_gravity),
+    world_set_wind: Some(super::sgn_world_set_wind),
 };

@@ -2,8 +2,8 @@
 
 use super::boundary::{call, change, look};
 use super::description::{
-    SGN_BODY_INERTIA_IN_WORLD, SGN_BODY_NO_SELF_COLLISION, SGN_BODY_POSED, SgnDeformableDesc, SgnHalfSpaceDesc,
-    SgnKinematicDesc, SgnRigidDesc,
+    SGN_BODY_INERTIA_IN_WORLD, SGN_BODY_MODEL_DRIVEN, SGN_BODY_NO_SELF_COLLISION, SGN_BODY_POSED, SgnDeformableDesc,
+    SgnHalfSpaceDesc, SgnKinematicDesc, SgnRigidDesc,
 };
 use super::status::{Failure, SGN_OK, SgnResult};
 use super::structs::{self, Growing};
@@ -15,9 +15,9 @@ use crate::world::{BodyKind, DeformableDescription, KinematicDescription, RigidD
 
 /// Kind of a body.
 pub type SgnBodyKind = i32;
-/// Free vertices, driven by the host.
+/// Nodes: free vertices, a sheet, or a solid of tetrahedra.
 pub const SGN_BODY_KIND_DEFORMABLE: i32 = 1;
-/// Rigid, driven by the host.
+/// Rigid.
 pub const SGN_BODY_KIND_RIGID: i32 = 2;
 /// Prescribed vertex positions.
 pub const SGN_BODY_KIND_KINEMATIC_MESH: i32 = 3;
@@ -34,13 +34,14 @@ pub struct SgnBodyInfo {
     pub struct_size: u32,
     /// An `SGN_BODY_` kind.
     pub kind: SgnBodyKind,
-    /// Number of vertices.
+    /// Number of vertices: of a solid that carries a surface, those of the surface.
     pub vertices: u64,
     /// Number of edges, those of triangles included.
     pub edges: u64,
     /// Number of triangles.
     pub triangles: u64,
-    /// Entries of its velocities and impulses: its vertices, or 1 for a rigid body, or 0.
+    /// Entries of its velocities and impulses: its nodes (its vertices, or those of the tetrahedra that carry them), or 1
+    /// for a rigid body, or 0.
     pub velocities: u64,
     /// Half thickness in use.
     pub half_thickness: f64,
@@ -79,7 +80,7 @@ pub unsafe extern "C" fn sgn_body_info_init(info: *mut SgnBodyInfo, size: usize)
 ///
 /// # Safety
 /// `world` is NULL or a live world, `desc` and `out` are NULL or valid.
-unsafe fn create<T: Growing>(
+pub(super) unsafe fn create<T: Growing>(
     world: *mut SgnWorld,
     function: &str,
     desc: *const T,
@@ -148,7 +149,7 @@ pub unsafe extern "C" fn sgn_rigid_create(
             let (vertices, topology) = desc.mesh.or_shape(desc.shape)?;
             let [a, b, c, d, e, f, g, h, i] = desc.inertia;
             Ok(world.add_rigid(RigidDescription {
-                options: desc.options.checked(desc.precision, SGN_BODY_INERTIA_IN_WORLD)?,
+                options: desc.options.checked(desc.precision, SGN_BODY_INERTIA_IN_WORLD | SGN_BODY_MODEL_DRIVEN)?,
                 vertices,
                 topology,
                 mass: desc.mass,
@@ -157,6 +158,8 @@ pub unsafe extern "C" fn sgn_rigid_create(
                 pose: Pose { position: desc.position, orientation: desc.orientation },
                 velocity: desc.velocity,
                 angular_velocity: desc.angular_velocity,
+                own_dynamics: (desc.options.flags & SGN_BODY_MODEL_DRIVEN != 0)
+                    .then_some([desc.linear_damping, desc.angular_damping]),
             })?)
         })
     }

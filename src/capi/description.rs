@@ -25,6 +25,9 @@ pub const SGN_BODY_INERTIA_IN_WORLD: u64 = 2;
 /// Flag of a kinematic mesh: it moves from pose to pose, its vertices are in the body frame. Always so with a shape.
 pub const SGN_BODY_POSED: u64 = 4;
 
+/// Flag of a rigid body: the library drives it, under gravity and its gyroscopic torque.
+pub const SGN_BODY_MODEL_DRIVEN: u64 = 32;
+
 /// What all bodies have in common. Frozen, like `SgnView`: it stands in the middle of other structs.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -45,7 +48,7 @@ pub struct SgnBodyOptions {
 }
 
 impl SgnBodyOptions {
-    const DEFAULT: SgnBodyOptions = SgnBodyOptions {
+    pub(super) const DEFAULT: SgnBodyOptions = SgnBodyOptions {
         flags: 0,
         half_thickness: -1.0,
         material: SgnMaterialId { value: 0 },
@@ -99,7 +102,7 @@ pub struct SgnMesh {
 }
 
 impl SgnMesh {
-    const EMPTY: SgnMesh =
+    pub(super) const EMPTY: SgnMesh =
         SgnMesh { vertices: SgnView::EMPTY, triangles: SgnView::EMPTY, edges: SgnView::EMPTY, points: SgnView::EMPTY };
 
     /// # Safety
@@ -179,7 +182,7 @@ unsafe impl Growing for SgnDeformableDesc {
     }
 }
 
-/// A rigid body whose dynamics are the host's: a mesh or a shape. Fill with `sgn_rigid_desc_init`.
+/// A rigid body, a mesh or a shape, driven by the host or, with `SGN_BODY_MODEL_DRIVEN`, by the library. Fill with `sgn_rigid_desc_init`.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct SgnRigidDesc {
@@ -201,16 +204,20 @@ pub struct SgnRigidDesc {
     pub position: [f64; 3],
     /// Orientation at the start, quaternion x y z w; made a unit one. Default: 0 0 0 1.
     pub orientation: [f64; 4],
-    /// Displacement velocity of the centre of mass. Default: 0.
+    /// Displacement velocity of the centre of mass; the velocity at the start if the library drives it. Default: 0.
     pub velocity: [f64; 3],
-    /// Angular displacement velocity, world axes, radians per time. Default: 0.
+    /// Angular displacement velocity, world axes, radians per time; likewise. Default: 0.
     pub angular_velocity: [f64; 3],
+    /// Rate at which the velocity decays; read with MODEL_DRIVEN. Default: 0.
+    pub linear_damping: f64,
+    /// Rate at which the angular velocity decays; read with MODEL_DRIVEN. Default: 0.
+    pub angular_damping: f64,
 }
 
 // SAFETY: repr(C) without padding; numbers and pointers.
 unsafe impl Growing for SgnRigidDesc {
     const NAME: &'static str = "SgnRigidDesc";
-    const FIRST_SIZE: usize = 408;
+    const FIRST_SIZE: usize = 424;
     fn defaults() -> Self {
         SgnRigidDesc {
             struct_size: 0,
@@ -224,6 +231,8 @@ unsafe impl Growing for SgnRigidDesc {
             orientation: [0.0, 0.0, 0.0, 1.0],
             velocity: [0.0; 3],
             angular_velocity: [0.0; 3],
+            linear_damping: 0.0,
+            angular_damping: 0.0,
         }
     }
 }

@@ -10,7 +10,8 @@ use crate::kinematics::Pose;
 use crate::model::{HalfSpace, Precision};
 use crate::world::{Outcome, World};
 
-/// What of a body is pushed or pulled. `n` is its number of vertices; vectors are F32X3 or F64X3.
+/// What of a body is pushed or pulled. `n` is its number of vertices, `m` that of its nodes (`velocities` of
+/// `sgn_body_info`): the same, but for a solid that carries a surface. Vectors are F32X3 or F64X3.
 pub type SgnSlot = i32;
 /// Positions, n vectors. Push: start positions of a deformable body or a kinematic mesh. Pull: where the vertices of any
 /// mesh stand; certified after a step, and only in the body's own precision.
@@ -19,8 +20,9 @@ pub const SGN_SLOT_POSITION: i32 = 1;
 pub const SGN_SLOT_POSE: i32 = 2;
 /// Plane of a half-space, one F32X4 or F64X4: unit normal, offset.
 pub const SGN_SLOT_HALF_SPACE: i32 = 3;
-/// Push: displacement velocity `v* = (x* - x0)/dt`, n vectors of a deformable body, one of a rigid body. It stays until the
-/// next push. Pull: `(x1 - x0)/dt` of the last step.
+/// Push: displacement velocity `v* = (x* - x0)/dt`, m vectors of a deformable body, one of a rigid body. It stays until the
+/// next push. Of a body that the library drives: the velocity at the start of the next step. Pull: `(x1 - x0)/dt` of the
+/// last step.
 pub const SGN_SLOT_VELOCITY: i32 = 4;
 /// Angular velocity of a rigid body, one vector, world axes, radians per time; push and pull as VELOCITY.
 pub const SGN_SLOT_ANGULAR_VELOCITY: i32 = 5;
@@ -29,19 +31,20 @@ pub const SGN_SLOT_ANGULAR_VELOCITY: i32 = 5;
 pub const SGN_SLOT_END_VELOCITY: i32 = 6;
 /// Pull only: the same, angular.
 pub const SGN_SLOT_END_ANGULAR_VELOCITY: i32 = 7;
-/// Pull only: contact impulse over the last step, n vectors or one.
+/// Pull only: contact impulse over the last step, m vectors or one.
 pub const SGN_SLOT_IMPULSE: i32 = 8;
 /// Pull only: angular contact impulse of a rigid body about its centre of mass, world axes, one vector.
 pub const SGN_SLOT_ANGULAR_IMPULSE: i32 = 9;
-/// Push only: where a kinematic mesh ends the next step, n vectors. Without a push it stays.
+/// Push only: where a kinematic mesh ends the next step, n vectors; where the pinned nodes of a body that the library
+/// drives do, m vectors, of which only theirs are read. Without a push they stay.
 pub const SGN_SLOT_TARGET_POSITION: i32 = 10;
 /// Push only: where a posed kinematic body ends the next step, one F32X7 or F64X7. Without a push it stays.
 pub const SGN_SLOT_TARGET_POSE: i32 = 11;
 /// Push only: where a half-space ends the next step, one F32X4 or F64X4. Without a push it stays.
 pub const SGN_SLOT_TARGET_HALF_SPACE: i32 = 12;
-/// Push only: lumped masses, n of a deformable body, one of a rigid body, F32 or F64.
+/// Push only: lumped masses, m of a deformable body, one of a rigid body, F32 or F64.
 pub const SGN_SLOT_MASS: i32 = 13;
-/// Push only: pin flags of a deformable body, n U8.
+/// Push only: pin flags of a deformable body, m U8.
 pub const SGN_SLOT_PINNED: i32 = 14;
 /// Pull only: rest positions, or positions in the body frame, n vectors.
 pub const SGN_SLOT_REST_POSITION: i32 = 15;
@@ -50,7 +53,14 @@ pub const SGN_SLOT_TRIANGLES: i32 = 16;
 /// Pull only: edges of the surface, U32X2 or U64X2.
 pub const SGN_SLOT_EDGES: i32 = 17;
 
-/// Flag of a push of POSITION, POSE or HALF_SPACE: the body jumps there. Without it the way from the state that the last
+/// Positions of the nodes of a deformable body, m vectors. Push and pull as POSITION, which a solid that carries a surface
+/// has for pulling only.
+pub const SGN_SLOT_NODE_POSITION: i32 = 18;
+/// Push only: where the attachments of a body that the library drives pull at the end of the next step, a vector each. Until
+/// the next push they stay.
+pub const SGN_SLOT_ATTACHMENT_TARGET: i32 = 19;
+
+/// Flag of a push of POSITION, NODE_POSITION, POSE or HALF_SPACE: the body jumps there. Without it the way from the state that the last
 /// step left is checked by the next step, so that nothing passes through anything between steps.
 pub const SGN_PUSH_TELEPORT: u64 = 1;
 
@@ -69,6 +79,12 @@ unsafe fn push(world: &mut World, id: u64, slot: SgnSlot, view: &SgnView, telepo
     unsafe {
         match slot {
             SGN_SLOT_POSITION => world.push_positions(id, views::floats::<3>(view, "position")?, teleport)?,
+            SGN_SLOT_NODE_POSITION => {
+                world.push_node_positions(id, views::floats::<3>(view, "node position")?, teleport)?;
+            }
+            SGN_SLOT_ATTACHMENT_TARGET => {
+                world.push_attachment_targets(id, views::floats::<3>(view, "attachment target")?)?;
+            }
             SGN_SLOT_POSE => world.push_pose(id, pose(views::one::<7>(view, "pose")?), teleport)?,
             SGN_SLOT_HALF_SPACE => {
                 world.push_half_space(id, plane(views::one::<4>(view, "half-space")?), teleport)?;
@@ -115,7 +131,8 @@ pub unsafe extern "C" fn sgn_body_push(
     unsafe {
         change(world, "sgn_body_push", |world, _| {
             let view = views::given(view, "view")?;
-            let jumps = matches!(slot, SGN_SLOT_POSITION | SGN_SLOT_POSE | SGN_SLOT_HALF_SPACE);
+            let jumps =
+                matches!(slot, SGN_SLOT_POSITION | SGN_SLOT_NODE_POSITION | SGN_SLOT_POSE | SGN_SLOT_HALF_SPACE);
             if flags & !(if jumps { SGN_PUSH_TELEPORT } else { 0 }) != 0 {
                 let message = format!("flags {flags:#x} are out of range for slot {slot}");
                 return Err(Failure::new(SGN_ERROR_INVALID_ARGUMENT, message).object(body.value));
@@ -151,6 +168,10 @@ fn pull(world: &World, id: u64, slot: SgnSlot, single: bool) -> Result<Pulled, F
             certified_only("position")?;
             vectors(world.positions(id)?)
         }
+        SGN_SLOT_NODE_POSITION => {
+            certified_only("position")?;
+            vectors(world.node_positions(id)?)
+        }
         SGN_SLOT_POSE => {
             certified_only("pose")?;
             let Pose { position: [px, py, pz], orientation: [x, y, z, w] } = world.pose(id)?;
@@ -167,7 +188,7 @@ fn pull(world: &World, id: u64, slot: SgnSlot, single: bool) -> Result<Pulled, F
         SGN_SLOT_ANGULAR_VELOCITY => vectors(&[world.angular_outcome(id, Outcome::Velocity)?]),
         SGN_SLOT_END_ANGULAR_VELOCITY => vectors(&[world.angular_outcome(id, Outcome::EndVelocity)?]),
         SGN_SLOT_ANGULAR_IMPULSE => vectors(&[world.angular_outcome(id, Outcome::Impulse)?]),
-        SGN_SLOT_REST_POSITION => vectors(&world.surface(id)?.rest),
+        SGN_SLOT_REST_POSITION => vectors(&world.surface(id)?.rest[..world.body_info(id)?.vertices]),
         SGN_SLOT_TRIANGLES => {
             let surface = world.surface(id)?;
             Pulled::Integers(3, surface.faces.iter().flatten().map(|vertex| u64::from(*vertex)).collect())
@@ -176,7 +197,7 @@ fn pull(world: &World, id: u64, slot: SgnSlot, single: bool) -> Result<Pulled, F
             let surface = world.surface(id)?;
             Pulled::Integers(2, surface.edges.iter().flatten().map(|vertex| u64::from(*vertex)).collect())
         }
-        SGN_SLOT_TARGET_POSITION..=SGN_SLOT_PINNED => {
+        SGN_SLOT_TARGET_POSITION..=SGN_SLOT_PINNED | SGN_SLOT_ATTACHMENT_TARGET => {
             return Err(Failure::new(SGN_ERROR_UNSUPPORTED, format!("slot {slot} can only be pushed")));
         }
         _ => return Err(unknown(slot)),

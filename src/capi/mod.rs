@@ -6,8 +6,8 @@
 //! * `structs`: structs that grow, by their size
 //! * `views`: strided host memory, read and written element by element
 //! * `version`, `api`: version, capabilities, the table for hosts that load the library themselves
-//! * `context`, `world`, `material`, `description`, `body`, `shape`, `drive`, `system`, `step`, `query`, `snapshot`: the
-//!   functions, by noun
+//! * `context`, `world`, `material`, `description`, `body`, `model`, `shape`, `drive`, `system`, `step`, `query`,
+//!   `snapshot`: the functions, by noun
 //!
 //! Every export returns a status, runs behind a panic boundary and writes its outputs only when it succeeds. The
 //! header is generated from these files by `tests/capi`, comments included.
@@ -23,6 +23,7 @@ mod description;
 mod drive;
 mod float_environment;
 mod material;
+mod model;
 mod query;
 mod shape;
 mod snapshot;
@@ -40,6 +41,7 @@ pub use context::*;
 pub use description::*;
 pub use drive::*;
 pub use material::*;
+pub use model::*;
 pub use query::*;
 pub use shape::*;
 pub use snapshot::*;

@@ -234,7 +234,7 @@ pub struct SgnStepReport {
     pub certified_fraction: f64,
     /// Microseconds of proximity and candidate search.
     pub search_microseconds: f64,
-    /// Microseconds of rows, frames and metric.
+    /// Microseconds of rows and frames.
     pub rows_microseconds: f64,
     /// Microseconds of constrained dynamics.
     pub solve_microseconds: f64,
@@ -248,12 +248,14 @@ pub struct SgnStepReport {
     pub total_microseconds: f64,
     /// Bytes held by the method's memory and buffers.
     pub bytes: u64,
+    /// Microseconds of the metric, and of assembly and unconstrained solve of the bodies that the library drives.
+    pub dynamics_microseconds: f64,
 }
 
 // SAFETY: repr(C) without padding; numbers.
 unsafe impl Growing for SgnStepReport {
     const NAME: &'static str = "SgnStepReport";
-    const FIRST_SIZE: usize = 192;
+    const FIRST_SIZE: usize = 200;
     fn defaults() -> Self {
         // SAFETY: numbers only.
         unsafe { std::mem::zeroed() }
@@ -296,6 +298,7 @@ impl SgnStepReport {
             certificate_microseconds: report.times.certificate,
             total_microseconds: report.times.total,
             bytes: report.bytes,
+            dynamics_microseconds: report.times.dynamics,
         }
     }
 

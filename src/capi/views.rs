@@ -24,6 +24,10 @@ pub const SGN_FORMAT_U32X3: i32 = 11;
 pub const SGN_FORMAT_U64X2: i32 = 12;
 /// `uint64_t[3]`
 pub const SGN_FORMAT_U64X3: i32 = 13;
+/// `uint32_t[4]`
+pub const SGN_FORMAT_U32X4: i32 = 14;
+/// `uint64_t[4]`
+pub const SGN_FORMAT_U64X4: i32 = 15;
 /// `float`
 pub const SGN_FORMAT_F32: i32 = 20;
 /// `double`
@@ -124,6 +128,8 @@ fn decode(format: SgnFormat) -> Option<(Scalar, usize, bool)> {
         SGN_FORMAT_U32X3 => (Scalar::U32, 3, false),
         SGN_FORMAT_U64X2 => (Scalar::U64, 2, false),
         SGN_FORMAT_U64X3 => (Scalar::U64, 3, false),
+        SGN_FORMAT_U32X4 => (Scalar::U32, 4, false),
+        SGN_FORMAT_U64X4 => (Scalar::U64, 4, false),
         SGN_FORMAT_F32 => (Scalar::F32, 1, false),
         SGN_FORMAT_F64 => (Scalar::F64, 1, false),
         SGN_FORMAT_F32X3 => (Scalar::F32, 3, false),

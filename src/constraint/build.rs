@@ -63,6 +63,7 @@ pub fn build_rows(
 
 /// Linear and angular entries of one contact: a rigid body's vertices collapse into one of each.
 fn push_entries(model: &Model, metric: &Metric, contact: &Contact, about: &Linearisation, rows: &mut RowSet) {
+    let first = rows.blocks.len();
     let mut rigid: [(usize, f64, Vec3); 4] = [(usize::MAX, 0.0, [0.0; 3]); 4];
     for k in 0..4 {
         let weight = contact.weights[k];
@@ -74,10 +75,8 @@ fn push_entries(model: &Model, metric: &Metric, contact: &Contact, about: &Linea
         let body = &model.bodies[index];
         match body.description.kind {
             Kind::Deformable { .. } => {
-                let block = body.blocks.start + vertex - body.vertices.start;
-                if !metric.fixed[block] {
-                    rows.blocks.push(block as u32);
-                    rows.weights.push(weight);
+                for (block, share) in body.carriers(vertex).filter(|(block, _)| !metric.fixed[*block]) {
+                    push_linear(rows, first, block as u32, weight * share);
                 }
             }
             Kind::Rigid { .. } => {
@@ -97,6 +96,17 @@ fn push_entries(model: &Model, metric: &Metric, contact: &Contact, about: &Linea
         }
         if !metric.fixed[linear + 1] {
             rows.angular.push(Angular { block: (linear + 1) as u32, lever });
+        }
+    }
+}
+
+/// Adds to the entry of a block among those from `first` on: points carried by one element share its nodes.
+fn push_linear(rows: &mut RowSet, first: usize, block: u32, weight: f64) {
+    match rows.blocks[first..].iter().position(|b| *b == block) {
+        Some(k) => rows.weights[first + k] += weight,
+        None => {
+            rows.blocks.push(block);
+            rows.weights.push(weight);
         }
     }
 }

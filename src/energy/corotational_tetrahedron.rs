@@ -13,13 +13,13 @@ use crate::math::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CorotationalTetrahedron {
     /// Rest volume `[m^3]`.
-    volume: f64,
+    pub(crate) volume: f64,
     /// `F = sum x_i b_i^T`: gradients of the shape functions at rest `[1/m]`.
-    gradients: [Vec3; 4],
+    pub(crate) gradients: [Vec3; 4],
     /// Lamé's lambda `[Pa]`.
-    lambda: f64,
+    pub(crate) lambda: f64,
     /// Lamé's mu `[Pa]`.
-    mu: f64,
+    pub(crate) mu: f64,
 }
 
 /// Lamé's lambda and mu of Young's modulus `[Pa]` and Poisson's ratio in `[0, 0.5)`.

@@ -95,6 +95,11 @@ pub struct Forces {
     pub damping: Damping,
 }
 
+/// Finite and not negative.
+fn good(value: f64) -> bool {
+    value >= 0.0 && value.is_finite()
+}
+
 /// Something that does not fit: what, place and value.
 pub type ForcesFault = (&'static str, usize, f64);
 
@@ -112,17 +117,42 @@ impl Forces {
         self.tetrahedra.add_forces(x, out);
     }
 
+    /// Counts that do not agree, material numbers out of range.
+    fn stencil_fault(&self) -> Option<ForcesFault> {
+        let counts = [
+            (self.springs.nodes.len(), self.springs.len()),
+            (self.membranes.nodes.len(), self.membranes.len()),
+            (self.hinges.nodes.len(), self.hinges.len()),
+            (self.tetrahedra.nodes.len(), self.tetrahedra.len()),
+        ];
+        if let Some((nodes, stencils)) = counts.iter().find(|(nodes, stencils)| nodes != stencils) {
+            return Some(("as many stencils as lists of nodes are needed", *nodes, *stencils as f64));
+        }
+        let elastic = |volume: f64, moduli: [f64; 2], gradients: &[f64]| {
+            good(volume) && moduli.into_iter().all(good) && gradients.iter().all(|g| g.is_finite())
+        };
+        let m = self.membranes.stencils.iter();
+        let membrane = m.enumerate().find(|(_, m)| !elastic(m.volume, [m.lambda, m.mu], m.gradients.as_flattened()));
+        let t = self.tetrahedra.stencils.iter();
+        let solid = t.enumerate().find(|(_, t)| !elastic(t.volume, [t.lambda, t.mu], t.gradients.as_flattened()));
+        let h = self.hinges.stencils.iter();
+        let hinge = h.enumerate().find(|(_, h)| !(good(h.stiffness) && h.rest_angle.is_finite()));
+        let found = membrane.map(|(i, m)| (i, m.mu)).or(solid.map(|(i, t)| (i, t.mu)));
+        let (i, value) = found.or(hinge.map(|(i, h)| (i, h.stiffness)))?;
+        Some(("a material number of an energy is out of range", i, value))
+    }
+
     /// What does not fit a body of `count` nodes, if anything.
     pub fn fault(&self, count: usize) -> Option<ForcesFault> {
         let stencil = |found: Option<(usize, u32)>| {
             let message = "an energy names a node that does not exist, or one twice";
             found.map(|(i, node)| (message, i, f64::from(node)))
         };
-        let good = |value: f64| value >= 0.0 && value.is_finite();
         stencil(self.springs.fault(count))
             .or_else(|| stencil(self.membranes.fault(count)))
             .or_else(|| stencil(self.hinges.fault(count)))
             .or_else(|| stencil(self.tetrahedra.fault(count)))
+            .or_else(|| self.stencil_fault())
             .or_else(|| {
                 let (list, message) =
                     (&self.springs.stencils, "a spring's stiffness and rest length are finite and not negative");

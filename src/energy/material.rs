@@ -50,7 +50,8 @@ impl SheetMaterial {
         self.bending_stiffness.unwrap_or(plate)
     }
 
-    fn check(&self) -> Result<(), MaterialFault> {
+    /// Errors: a number out of its range.
+    pub fn check(&self) -> Result<(), MaterialFault> {
         check_positive(&[self.density, self.thickness, self.young_modulus, self.rest_scale])?;
         check_poisson(self.poisson_ratio)?;
         let bending = self.bending();
@@ -155,11 +156,16 @@ impl SheetMaterial {
 }
 
 impl SolidMaterial {
-    /// Co-rotational tetrahedra. Errors: material out of range; an element whose scaled volume cannot be represented.
-    pub fn solid(&self, mesh: &TetMesh) -> Result<Forces, MaterialFault> {
+    /// Errors: a number out of its range.
+    pub fn check(&self) -> Result<(), MaterialFault> {
         check_positive(&[self.density, self.young_modulus, self.rest_scale])?;
         check_poisson(self.poisson_ratio)?;
-        check_damping(&self.damping)?;
+        check_damping(&self.damping)
+    }
+
+    /// Co-rotational tetrahedra. Errors: material out of range; an element whose scaled volume cannot be represented.
+    pub fn solid(&self, mesh: &TetMesh) -> Result<Forces, MaterialFault> {
+        self.check()?;
         let mut forces = Forces { damping: self.damping, ..Forces::default() };
         for (i, nodes) in mesh.tetrahedra.iter().enumerate() {
             let corners = mesh.corners(i).map(|p| crate::math::scale(self.rest_scale, p));

@@ -1,20 +1,18 @@
 //! Which blocks of a body's matrix its energies fill.
 
 use super::{Elements, Forces, Stencil};
+use crate::linalg::{BlockMatrix, Envelope};
 
 /// Places of a stencil's blocks among the values of the matrix.
 pub type Places<const N: usize> = [[u32; N]; N];
 
-/// Block pattern of a body over its nodes, full rows, columns ascending, diagonal present; and where every energy adds.
-/// Depends on the topology alone: made once.
+/// Block pattern of a body over its nodes, and where every energy adds. Depends on the topology alone: made once.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pattern {
-    /// Start of each block row in `columns`; one more entry than nodes.
-    pub row_offsets: Vec<usize>,
-    /// Block columns.
-    pub columns: Vec<u32>,
-    /// Place of each diagonal block.
-    pub diagonal: Vec<u32>,
+    /// The matrix without values.
+    pub matrix: BlockMatrix,
+    /// The envelope of its direct factor.
+    pub envelope: Envelope,
     /// Places of the springs' blocks.
     pub springs: Vec<Places<2>>,
     /// Places of the membranes' blocks.
@@ -44,8 +42,10 @@ impl Pattern {
             row_offsets[i + 1] += row_offsets[i];
         }
         let columns: Vec<u32> = pairs.iter().map(|p| p.1).collect();
-        let mut pattern = Pattern { row_offsets, columns, ..Pattern::default() };
-        pattern.diagonal = (0..count as u32).map(|i| pattern.place(i, i)).collect();
+        let matrix = BlockMatrix { row_offsets, columns, ..BlockMatrix::default() };
+        let mut pattern = Pattern { matrix, ..Pattern::default() };
+        pattern.matrix.diagonal = (0..count as u32).map(|i| pattern.place(i, i) as usize).collect();
+        pattern.envelope = Envelope::new(&pattern.matrix);
         pattern.springs = pattern.places(&forces.springs);
         pattern.membranes = pattern.places(&forces.membranes);
         pattern.hinges = pattern.places(&forces.hinges);
@@ -55,8 +55,9 @@ impl Pattern {
     }
 
     fn place(&self, row: u32, column: u32) -> u32 {
-        let slots = self.row_offsets[row as usize]..self.row_offsets[row as usize + 1];
-        let within = self.columns[slots.clone()].partition_point(|c| *c < column);
+        let BlockMatrix { row_offsets, columns, .. } = &self.matrix;
+        let slots = row_offsets[row as usize]..row_offsets[row as usize + 1];
+        let within = columns[slots.clone()].partition_point(|c| *c < column);
         (slots.start + within) as u32
     }
 
@@ -87,9 +88,9 @@ mod tests {
         let mut forces = Forces { drag_faces: vec![[3, 1, 0]], ..Forces::default() };
         forces.springs.push([2, 0], Spring { stiffness: 1.0, rest_length: 1.0 });
         let pattern = Pattern::new(&forces, 5);
-        assert_eq!(pattern.row_offsets, [0, 4, 7, 9, 12, 13]);
-        assert_eq!(pattern.columns, [0, 1, 2, 3, 0, 1, 3, 0, 2, 0, 1, 3, 4]);
-        assert_eq!(pattern.diagonal, [0, 5, 8, 11, 12]);
+        assert_eq!(pattern.matrix.row_offsets, [0, 4, 7, 9, 12, 13]);
+        assert_eq!(pattern.matrix.columns, [0, 1, 2, 3, 0, 1, 3, 0, 2, 0, 1, 3, 4]);
+        assert_eq!(pattern.matrix.diagonal, [0, 5, 8, 11, 12]);
         assert_eq!(pattern.springs, [[[8, 7], [2, 0]]]);
         assert_eq!(pattern.drag[0][0], [11, 10, 9]);
     }

@@ -17,13 +17,13 @@ const DEGENERATE: f64 = 1e-10;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleMembrane {
     /// Rest volume `A h` `[m^3]`.
-    volume: f64,
+    pub(crate) volume: f64,
     /// `F = sum x_i b_i^T`: gradients of the shape functions in the plane at rest `[1/m]`.
-    gradients: [[f64; 2]; 3],
+    pub(crate) gradients: [[f64; 2]; 3],
     /// Lamé's lambda of plane stress `[Pa]`.
-    lambda: f64,
+    pub(crate) lambda: f64,
     /// Lamé's mu `[Pa]`.
-    mu: f64,
+    pub(crate) mu: f64,
 }
 
 /// Deformation gradient split into what its energy needs.

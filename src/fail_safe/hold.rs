@@ -42,7 +42,7 @@ pub fn hold(
             break;
         }
         if round == ROUNDS {
-            held.iter_mut().enumerate().for_each(|(n, h)| *h = is_movable(sweep, &nodes, n));
+            held.iter_mut().enumerate().for_each(|(n, h)| *h = nodes.is_movable(n));
         }
         for hit in &outcome.hits {
             for node in nodes.of_pair(&hit.pair) {
@@ -59,12 +59,4 @@ pub fn hold(
     }
     outcome.held = (0..held.len()).filter(|n| held[*n]).collect();
     outcome
-}
-
-fn is_movable(sweep: &Sweep, nodes: &Nodes, node: usize) -> bool {
-    let own = match nodes.body(node) {
-        Some(body) => nodes.of_body(body) == node && !sweep.segment.model.bodies[body].blocks.is_empty(),
-        None => nodes.of_vertex(node as u32) == node,
-    };
-    own && !nodes.is_scripted(node)
 }

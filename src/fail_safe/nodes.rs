@@ -1,11 +1,12 @@
-//! What a fail-safe moves as one: a deformable vertex, a whole rigid body, or something scripted.
+//! What a fail-safe moves as one: a node of a deformable body, a whole rigid body, or something scripted.
 
 use crate::constraint::Metric;
 use crate::contact_search::{Hit, Pair, PairKind};
 use crate::model::{Kind, Model};
 
-/// Nodes of a model: one per vertex and one per body. Vertices of rigid and posed bodies share their body's node, so
-/// that a zone owns every degree of freedom that its bodies drive.
+/// Nodes of a model: one per vertex and one per body. Vertices of rigid and posed bodies share their body's node, points
+/// carried by tetrahedra stand for the nodes of their element, so that a zone owns every degree of freedom that its
+/// bodies drive.
 pub struct Nodes<'a> {
     model: &'a Model,
     scripted: Vec<bool>,
@@ -19,7 +20,7 @@ impl<'a> Nodes<'a> {
         for (index, body) in model.bodies.iter().enumerate() {
             match body.description.kind {
                 Kind::Deformable { .. } => {
-                    for (vertex, block) in body.vertices.clone().zip(body.blocks.clone()) {
+                    for (vertex, block) in body.nodes().zip(body.blocks.clone()) {
                         scripted[vertex] = metric.fixed[block];
                     }
                 }
@@ -55,23 +56,41 @@ impl<'a> Nodes<'a> {
         node.checked_sub(self.model.vertex_body.len())
     }
 
-    /// Node that moves a vertex.
-    pub fn of_vertex(&self, vertex: u32) -> usize {
-        let body = self.model.vertex_body[vertex as usize] as usize;
-        match self.model.bodies[body].description.kind {
-            Kind::Rigid { .. } | Kind::Kinematic { posed: true } => self.of_body(body),
-            _ => vertex as usize,
+    /// Adds the nodes that move a vertex.
+    fn push_of_vertex(&self, vertex: usize, nodes: &mut Vec<usize>) {
+        let index = self.model.vertex_body[vertex] as usize;
+        let body = &self.model.bodies[index];
+        match body.description.kind {
+            Kind::Rigid { .. } | Kind::Kinematic { posed: true } => nodes.push(self.of_body(index)),
+            Kind::Deformable { .. } => {
+                let first = body.nodes().start;
+                nodes.extend(body.carriers(vertex).map(|(block, _)| first + block - body.blocks.start));
+            }
+            _ => nodes.push(vertex),
         }
+    }
+
+    /// Whether a fail-safe can move a node: it is no script, and not a vertex that others carry.
+    pub fn is_movable(&self, node: usize) -> bool {
+        let own = match self.body(node) {
+            Some(body) => matches!(self.model.bodies[body].description.kind, Kind::Rigid { .. }),
+            None => {
+                let body = &self.model.bodies[self.model.vertex_body[node] as usize];
+                matches!(body.description.kind, Kind::Deformable { .. }) && body.nodes().contains(&node)
+            }
+        };
+        own && !self.scripted[node]
     }
 
     /// Nodes of a pair, sorted, without repeats.
     pub fn of_pair(&self, pair: &Pair) -> Vec<usize> {
-        let mut nodes: Vec<usize> = match pair.kind {
-            PairKind::VertexHalfSpace => {
-                vec![self.of_vertex(pair.features[0]), self.of_body(pair.features[1] as usize)]
-            }
-            _ => pair.vertices(self.model).iter().map(|v| self.of_vertex(*v)).collect(),
-        };
+        let mut nodes = Vec::with_capacity(4);
+        if pair.kind == PairKind::VertexHalfSpace {
+            self.push_of_vertex(pair.features[0] as usize, &mut nodes);
+            nodes.push(self.of_body(pair.features[1] as usize));
+        } else {
+            pair.vertices(self.model).iter().for_each(|v| self.push_of_vertex(*v as usize, &mut nodes));
+        }
         nodes.sort_unstable();
         nodes.dedup();
         nodes
@@ -88,7 +107,7 @@ impl<'a> Nodes<'a> {
             Some(body) => self.model.bodies[body].blocks.start,
             None => {
                 let body = &self.model.bodies[self.model.vertex_body[node] as usize];
-                body.blocks.start + node - body.vertices.start
+                body.blocks.start + node - body.nodes().start
             }
         }
     }

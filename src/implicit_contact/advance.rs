@@ -1,14 +1,14 @@
 //! One step of implicit contact, as its list of stages. Numbers as in `docs/method/implicit.md`.
 
 use super::commit::StepAccount;
+use super::driven::{Driven, has_own_dynamics};
 use super::fall_back::{FallBack, fall_back, witnesses};
 use super::manifold_refinement::{Surroundings, lap, refine};
 use super::memory::Certified;
 use super::{Memory, SolverScratch};
-use crate::constraint::Metric;
 use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing, intersections};
 use crate::fail_safe::parts_of_step;
-use crate::math::Vec3;
+use crate::math::{Vec3, is_finite};
 use crate::model::{
     BuildError, Drives, Kind, Model, Segment, Settings, StartPolicy, State, StepError, StepReport, StepResult,
 };
@@ -51,19 +51,20 @@ pub fn advance(
     let (mut whole, mut clock) = (Instant::now(), Instant::now());
     // (1) What was pushed.
     check_inputs(model, state, drives, settings, dt)?;
-    // (2) The metric; HOST bodies bring their unconstrained velocities.
-    let metric = Metric::new(model, state, drives)?;
+    // (2) A, b and unconstrained velocities of MODEL bodies, HOST bodies bring theirs; the metric.
+    let undivided = Segment { model, drives, step_start: state, start: state, from: 0.0, to: 1.0, dt };
+    let driven = Driven::new(&undivided, par)?;
     let filter = BodyFilter::new(model);
-    let mut account = StepAccount::new(model, state, drives);
-    account.rounds.rows += lap(&mut clock);
+    let mut account = StepAccount::new(model, state, &driven.drives);
+    account.report.times.dynamics += lap(&mut clock);
     // (3) The start state: certified, refused, or tangled.
     let mut passing = start_state(model, &filter, state, memory, settings, &mut account.report, par)?;
     account.report.times.certificate += lap(&mut clock);
     // (4) to (7), part by part.
-    let around = Surroundings { metric: &metric, filter: &filter, settings, par };
-    let pinch = run_parts(&around, model, state, drives, memory, dt, &mut passing, scratch, &mut account);
+    let around = Surroundings { metric: &driven.metric, filter: &filter, settings, par };
+    let pinch = run_parts(&around, &undivided, &driven, memory, &mut passing, scratch, &mut account)?;
     // (8) Commit and report.
-    commit(&around, model, state, memory, dt, result, &passing, &mut account);
+    commit((&filter, settings, par), model, state, memory, dt, result, &passing, &mut account);
     let mut report = account.finished_report();
     report.bytes = (memory.bytes() + scratch.candidates.bytes()) as u64;
     report.times.total = lap(&mut whole);
@@ -75,26 +76,32 @@ pub fn advance(
 
 /// Stages 4 to 7 for each part of the step; the pairs that leave no room if it was pinched.
 fn run_parts(
-    around: &Surroundings,
-    model: &Model,
-    state: &State,
-    drives: &Drives,
+    whole: &Surroundings,
+    undivided: &Segment,
+    driven: &Driven,
     memory: &Memory,
-    dt: f64,
     passing: &mut Passing,
     scratch: &mut Scratch,
     account: &mut StepAccount,
-) -> Option<Vec<Hit>> {
-    let settings = around.settings;
+) -> Result<Option<Vec<Hit>>, StepError> {
+    let (settings, model) = (whole.settings, undivided.model);
     let (contacts, velocities) = (memory.contacts.clone(), memory.velocities.clone());
     let mut warm = Memory { contacts, dt: memory.dt, velocities, certified: None };
-    let mut parts = parts_of_step(model, state, drives, settings, dt);
+    let mut parts = parts_of_step(model, undivided.start, &driven.drives, settings, undivided.dt);
     let mut passes = 0;
     while let Some(part) = parts.pop() {
         let share = part.to - part.from;
         let here = account.state.clone();
-        let segment =
-            Segment { model, drives, step_start: state, start: &here, from: part.from, to: part.to, dt: share * dt };
+        let dt = share * undivided.dt;
+        let pushed = Segment { start: &here, from: part.from, to: part.to, dt, ..*undivided };
+        // (1) and (2) again for a part of the step: MODEL bodies are re-assembled, HOST bodies go a part of their path.
+        let mut clock = Instant::now();
+        let own = (share < 1.0 && has_own_dynamics(model)).then(|| Driven::new(&pushed, whole.par)).transpose()?;
+        let driven = own.as_ref().unwrap_or(driven);
+        let (segment, around) =
+            (Segment { drives: &driven.drives, ..pushed }, &Surroundings { metric: &driven.metric, ..*whole });
+        account.rounds.not_converged |= !driven.converged;
+        account.report.times.dynamics += lap(&mut clock);
         // (4) to (6) Contacts, rows, anticipation, continuous detection, round by round.
         let refined = refine(around, &segment, passing, &warm, scratch, &mut account.rounds);
         if refined.hits.is_empty() {
@@ -128,11 +135,11 @@ fn run_parts(
                 }
                 account.report.certified_fraction = part.from + within * share;
                 account.state = *stopped;
-                return Some(hits);
+                return Ok(Some(hits));
             }
         }
     }
-    None
+    Ok(None)
 }
 
 /// The policy PASS: vertices of the pairs that leave no room, or of both their bodies, become tangled. Whether any did.
@@ -152,7 +159,7 @@ fn let_pass(model: &Model, hits: &[Hit], whole_bodies: bool, passing: &mut Passi
 
 /// Stage 8: memory, state and result, all at once.
 fn commit(
-    around: &Surroundings,
+    (filter, settings, par): (&BodyFilter, &Settings, Par),
     model: &Model,
     state: &mut State,
     memory: &mut Memory,
@@ -170,12 +177,12 @@ fn commit(
     std::mem::swap(state, &mut account.state);
     memory.certified = passing.is_empty().then(|| Certified {
         topology: model.topology_hash,
-        filter: around.filter.fingerprint(),
+        filter: filter.fingerprint(),
         positions: state.positions.clone(),
         half_spaces: state.half_spaces.clone(),
     });
-    if around.settings.certify {
-        let found = intersections(model, around.filter, state, around.par).witnesses.len();
+    if settings.certify {
+        let found = intersections(model, filter, state, par).witnesses.len();
         account.report.intersections = Some(found as u32);
         if found > 0 {
             memory.certified = None;
@@ -220,15 +227,22 @@ fn check_inputs(model: &Model, state: &State, drives: &Drives, settings: &Settin
         && drives.target_poses.len() == bodies
         && state.half_spaces.len() == bodies
         && drives.target_half_spaces.len() == bodies
-        && drives.velocities.len() == model.block_count;
+        && drives.velocities.len() == model.block_count
+        && state.velocities.len() == model.block_count
+        && drives.attachments.len() == model.attachment_count;
     if !fits {
         return fail(0, 0.0, "state or drives do not fit the model");
     }
-    if drives.systems.len() != model.systems.len() {
+    if drives.systems.len() != model.host_systems {
         return fail(drives.systems.len(), 0.0, "one set of values per system");
     }
     if let Some(i) = drives.velocities.iter().position(|v| !is_within_range(*v, dt)) {
         return fail(i, largest(drives.velocities[i]), "velocity is not finite, or its way in this step out of range");
+    }
+    let fields = [drives.gravity, drives.wind];
+    let given = state.velocities.iter().chain(&fields).chain(drives.attachments.iter().flatten());
+    if let Some((i, v)) = given.enumerate().find(|(_, v)| !is_finite(**v)) {
+        return fail(i, largest(*v), "a velocity, gravity, wind or target is not finite");
     }
     let positions = || state.positions.iter().chain(&drives.target_positions);
     if let Some((i, x)) = positions().enumerate().find(|(_, x)| !is_within_range(**x, 1.0)) {
@@ -242,7 +256,7 @@ fn check_inputs(model: &Model, state: &State, drives: &Drives, settings: &Settin
 }
 
 /// Whether every component times `factor` is finite and not beyond [`FARTHEST`].
-fn is_within_range(v: Vec3, factor: f64) -> bool {
+pub(super) fn is_within_range(v: Vec3, factor: f64) -> bool {
     v.iter().all(|c| (c * factor).abs() <= FARTHEST)
 }
 

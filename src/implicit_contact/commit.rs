@@ -2,8 +2,8 @@
 
 use super::manifold_refinement::{Refined, RoundAccount, Surroundings};
 use crate::contact_search::{Contact, PairKind};
-use crate::math::{Vec3, add, add_scaled, cross, dot, norm, scale, sub};
-use crate::model::{ContactRecord, Drives, Kind, Model, State, StepReport, StepResult};
+use crate::math::{Vec3, add_scaled, cross, dot, norm, scale, sub};
+use crate::model::{Body, ContactRecord, Drives, Kind, Model, State, StepReport, StepResult};
 
 /// Sums over the parts of a step.
 pub(super) struct StepAccount {
@@ -38,8 +38,12 @@ impl StepAccount {
 
     /// Takes over a clean part that lasts `share` of the step.
     pub fn add_part(&mut self, model: &Model, around: &Surroundings, refined: Refined, share: f64, dt: f64) {
-        for (sum, impulse) in self.impulses.iter_mut().zip(&refined.block_impulses) {
-            *sum = add_scaled(*sum, share, *impulse);
+        // A HOST body's parts are shares of one path, those of a MODEL body are steps of their own.
+        let weight = |body: &Body| if body.description.dynamics.is_some() { 1.0 } else { share };
+        for body in &model.bodies {
+            for block in body.blocks.clone() {
+                self.impulses[block] = add_scaled(self.impulses[block], weight(body), refined.block_impulses[block]);
+            }
         }
         let report = &mut self.report;
         report.parts += 1;
@@ -47,16 +51,17 @@ impl StepAccount {
         for (row, index) in refined.built.contact.iter().enumerate() {
             let contact = &refined.set.contacts[*index as usize];
             let f = refined.set.solved[*index as usize].impulse;
+            let share = contact.pair.bodies(model).into_iter().map(|b| weight(&model.bodies[b])).fold(share, f64::max);
             let on_fixed = fixed_share(model, around, contact);
             report.momentum_taken = add_scaled(report.momentum_taken, share * on_fixed, f);
             let regained = (refined.set.required_gaps[*index as usize] - contact.start_gap).max(0.0);
             report.recovery_work += share * dot(refined.built.rows.frames[row][0], f) * regained / dt;
             if contact.pair.kind != PairKind::VertexHalfSpace && on_fixed == 0.0 {
                 let arm = start_separation(contact, &self.state.positions);
-                angular_error = add(angular_error, cross(arm, f));
+                angular_error = add_scaled(angular_error, share, cross(arm, f));
             }
         }
-        report.angular_momentum_error += share * norm(angular_error);
+        report.angular_momentum_error += norm(angular_error);
         self.state.clone_from(&refined.end);
         self.end_velocities.clone_from(&refined.velocities);
         self.last = refined;
@@ -95,6 +100,7 @@ impl StepAccount {
         let velocities = mean_velocities(model, start, &self.state, dt);
         if self.report.certified_fraction < 1.0 {
             self.end_velocities.clone_from(&velocities);
+            self.state.velocities.clone_from(&velocities);
         }
         StepResult {
             velocities,
@@ -112,17 +118,16 @@ fn fixed_share(model: &Model, around: &Surroundings, contact: &Contact) -> f64 {
     for k in 0..4 {
         let vertex = contact.vertices[k] as usize;
         let body = &model.bodies[model.vertex_body[vertex] as usize];
-        let block = match body.description.kind {
-            Kind::Deformable { .. } => body.blocks.start + vertex - body.vertices.start,
-            Kind::Rigid { .. } => body.blocks.start,
-            _ => continue,
-        };
-        if !around.metric.fixed[block] {
-            felt += contact.weights[k];
-        }
+        let fixed = &around.metric.fixed;
+        felt += contact.weights[k]
+            * match body.description.kind {
+                Kind::Deformable { .. } => body.carriers(vertex).filter(|(b, _)| !fixed[*b]).map(|(_, w)| w).sum(),
+                Kind::Rigid { .. } if !fixed[body.blocks.start] => 1.0,
+                _ => 0.0,
+            };
     }
     // Weights sum to zero up to rounding where everything moves.
-    if felt.abs() <= 4.0 * f64::EPSILON { 0.0 } else { -felt }
+    if felt.abs() <= 64.0 * f64::EPSILON { 0.0 } else { -felt }
 }
 
 fn start_separation(contact: &Contact, x0: &[Vec3]) -> Vec3 {
@@ -135,7 +140,7 @@ fn mean_velocities(model: &Model, start: &State, end: &State, dt: f64) -> Vec<Ve
     for (index, body) in model.bodies.iter().enumerate() {
         match body.description.kind {
             Kind::Deformable { .. } => {
-                for (vertex, block) in body.vertices.clone().zip(body.blocks.clone()) {
+                for (vertex, block) in body.nodes().zip(body.blocks.clone()) {
                     velocities[block] = scale(1.0 / dt, sub(end.positions[vertex], start.positions[vertex]));
                 }
             }

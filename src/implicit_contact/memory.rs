@@ -116,6 +116,8 @@ mod tests {
             mask: 1,
             self_collision: false,
             precision: Precision::Double,
+            embedding: None,
+            dynamics: None,
         };
         let point = Surface { rest: vec![[0.0; 3]], vertices: vec![0], ..Surface::default() };
         let plane = HalfSpace { normal: [0.0, 0.0, 1.0], offset: 0.0 };

@@ -28,6 +28,7 @@ mod block_diagonal;
 mod commit;
 mod constraint_set;
 mod double_relaxation;
+mod driven;
 mod fall_back;
 mod friction;
 mod full_anticipation;

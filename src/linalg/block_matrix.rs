@@ -4,7 +4,7 @@ use crate::math::{Mat3, Vec3, add, mat_vec};
 use crate::parallel::Par;
 
 /// A symmetric block matrix by rows: full rows, columns ascending, the diagonal block present in each.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct BlockMatrix {
     /// Start of each row in `columns` and `values`; one more entry than rows.
     pub row_offsets: Vec<usize>,

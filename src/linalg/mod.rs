@@ -5,11 +5,13 @@
 //! * `gauss_seidel`: block relaxation
 //! * `conjugate_gradient`: preconditioned conjugate gradients
 //! * `incomplete_cholesky`: a preconditioner
+//! * `envelope_cholesky`: a direct factor, for small or narrow matrices
 //! * `colouring`: groups of items that share no block
 
 mod block_matrix;
 mod colouring;
 mod conjugate_gradient;
+mod envelope_cholesky;
 mod gauss_seidel;
 mod incomplete_cholesky;
 mod single_precision;
@@ -17,6 +19,7 @@ mod single_precision;
 pub use block_matrix::BlockMatrix;
 pub use colouring::{Colouring, colour};
 pub use conjugate_gradient::{GradientBuffers, GradientEnding, conjugate_gradient};
+pub use envelope_cholesky::{Envelope, EnvelopeCholesky};
 pub use gauss_seidel::gauss_seidel_sweep;
 pub use incomplete_cholesky::IncompleteCholesky;
 pub use single_precision::{Rounded, SinglePrecision, power_of_two};

@@ -1,18 +1,18 @@
 //! What a body is, who drives it, what it collides with.
 
-use super::{BuildError, HalfSpace, Materials, SystemDescription};
+use super::{BuildError, Dynamics, HalfSpace, Materials, SystemDescription};
 use crate::math::{Mat3, Vec3};
-use crate::mesh::Surface;
+use crate::mesh::{Embedding, Surface};
 use std::sync::Arc;
 
 /// What moves a body.
 #[derive(Clone, Debug)]
 pub enum Kind {
-    /// Every vertex is a block, driven by the host's displacement velocities.
+    /// Every node is a block: every vertex, or every node of the tetrahedra that carry the vertices.
     Deformable {
-        /// Lumped mass per vertex `[kg]`, positive.
+        /// Lumped mass per node `[kg]`, positive.
         masses: Vec<f64>,
-        /// Vertices that follow their displacement velocity exactly (infinite mass).
+        /// Nodes of infinite mass: they follow their displacement velocity, or the script of a MODEL body, exactly.
         pinned: Vec<bool>,
     },
     /// Two blocks, linear and angular, about the centre of mass.
@@ -62,6 +62,11 @@ pub struct BodyDescription {
     pub self_collision: bool,
     /// Number format of the host.
     pub precision: Precision,
+    /// The first vertices of the surface as points carried by nodes, which are the vertices after them; `None`: every
+    /// vertex is a node. Deformable bodies only.
+    pub embedding: Option<Arc<Embedding>>,
+    /// What moves it if the library does (MODEL); `None`: the host drives it.
+    pub dynamics: Option<Arc<Dynamics>>,
 }
 
 /// A contiguous range of blocks, vertices, edges or faces.
@@ -82,6 +87,30 @@ pub struct Body {
     pub edges: BlockRange,
     /// Its faces in [`Model::faces`].
     pub faces: BlockRange,
+    /// Its springs to targets in [`super::Drives::attachments`].
+    pub attachments: BlockRange,
+}
+
+impl Body {
+    /// Vertices that stand for the nodes of a deformable body, in the order of its blocks.
+    pub fn nodes(&self) -> BlockRange {
+        self.vertices.end - self.blocks.len()..self.vertices.end
+    }
+
+    /// Blocks that carry a vertex of a deformable body, and their weights; those without weight are left out.
+    pub fn carriers(&self, vertex: usize) -> impl Iterator<Item = (usize, f64)> {
+        let nodes = self.nodes();
+        let (mut blocks, mut weights) = ([0; 4], [0.0; 4]);
+        match &self.description.embedding {
+            Some(embedding) if vertex < nodes.start => {
+                let point = vertex - self.vertices.start;
+                blocks = embedding.nodes[point].map(|node| self.blocks.start + node as usize);
+                weights = embedding.weights[point];
+            }
+            _ => (blocks[0], weights[0]) = (self.blocks.start + vertex - nodes.start, 1.0),
+        }
+        blocks.into_iter().zip(weights).filter(|(_, w)| *w != 0.0)
+    }
 }
 
 /// Constant between steps: bodies, topology over all bodies, materials, patterns of host systems.
@@ -103,8 +132,12 @@ pub struct Model {
     pub block_count: usize,
     /// Materials.
     pub materials: Materials,
-    /// Patterns of host systems.
+    /// Patterns of host systems, then those of the deformable bodies that the library drives.
     pub systems: Vec<SystemDescription>,
+    /// How many of the systems are the host's.
+    pub host_systems: usize,
+    /// Number of springs to targets.
+    pub attachment_count: usize,
     /// Hash of contact vertices, edges and faces: names the topology that caches were built for.
     pub topology_hash: u64,
 }
@@ -120,7 +153,7 @@ impl Model {
     ) -> Result<Model, BuildError> {
         bodies.sort_by_key(|body| body.key);
         super::validate::check(&bodies, &materials, &systems)?;
-        let mut model = Model { materials, systems, ..Model::default() };
+        let mut model = Model { materials, host_systems: systems.len(), systems, ..Model::default() };
         for description in bodies {
             let first = model.rest.len();
             let surface = description.surface.clone();
@@ -133,10 +166,19 @@ impl Model {
             model.contact_vertices.extend(surface.vertices.iter().map(|v| v + offset));
             model.vertex_body.resize(model.rest.len(), body_index);
             let blocks = match &description.kind {
-                Kind::Deformable { .. } => surface.rest.len(),
+                Kind::Deformable { masses, .. } => masses.len(),
                 Kind::Rigid { .. } => 2,
                 Kind::Kinematic { .. } | Kind::HalfSpace(_) => 0,
             };
+            if let Some(Dynamics::Deformable { pattern, .. }) = description.dynamics.as_deref() {
+                model.systems.push(SystemDescription {
+                    bodies: vec![description.key],
+                    row_offsets: pattern.matrix.row_offsets.clone(),
+                    columns: pattern.matrix.columns.clone(),
+                    upper: false,
+                });
+            }
+            let attachments = description.dynamics.as_ref().map_or(0, |d| d.attachments());
             let half_thickness = description.half_thickness.unwrap_or_else(|| default_half_thickness(&surface));
             model.bodies.push(Body {
                 description,
@@ -145,8 +187,10 @@ impl Model {
                 blocks: model.block_count..model.block_count + blocks,
                 edges: first_edge..model.edges.len(),
                 faces: first_face..model.faces.len(),
+                attachments: model.attachment_count..model.attachment_count + attachments,
             });
             model.block_count += blocks;
+            model.attachment_count += attachments;
         }
         model.topology_hash = topology_hash(&model);
         Ok(model)

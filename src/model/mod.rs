@@ -1,6 +1,7 @@
 //! The constant model, the state that a step changes, settings and reports.
 //!
 //! * `body`: what a body is, who drives it, what it collides with
+//! * `dynamics`: what moves a body that the library drives itself
 //! * `material`: friction with its combine rule
 //! * `system`: block pattern of a host matrix over one or more bodies
 //! * `state`: positions and poses; what the host drives
@@ -10,6 +11,7 @@
 //! * `report`: what a step did, and how it can fail
 
 mod body;
+mod dynamics;
 mod material;
 mod motion;
 mod report;
@@ -20,6 +22,7 @@ mod validate;
 
 pub use crate::mesh::Surface;
 pub use body::{BlockRange, Body, BodyDescription, Kind, Model, Precision, default_half_thickness};
+pub use dynamics::Dynamics;
 pub use material::{CombineRule, Material, Materials};
 pub use motion::Segment;
 pub use report::{BuildError, ContactRecord, StageTimes, StepError, StepReport, Witness};

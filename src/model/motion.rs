@@ -15,6 +15,7 @@ impl Model {
             positions: self.rest.clone(),
             poses: vec![Pose::IDENTITY; self.bodies.len()],
             half_spaces: self.bodies.iter().map(half_space).collect(),
+            velocities: vec![[0.0; 3]; self.block_count],
         }
     }
 
@@ -31,6 +32,17 @@ impl Model {
         );
     }
 
+    /// Puts the embedded points of a deformable body where its nodes carry them, rounded if `single`.
+    pub fn carry_points(&self, state: &mut State, body: usize, single: bool) {
+        let b = &self.bodies[body];
+        let Some(embedding) = &b.description.embedding else { return };
+        let (points, nodes) = state.positions[b.vertices.clone()].split_at_mut(b.vertices.len() - b.blocks.len());
+        for (i, x) in points.iter_mut().enumerate() {
+            let placed = embedding.place(i, nodes);
+            *x = if single { rounded_to_single(placed) } else { placed };
+        }
+    }
+
     /// Drives that ask for nothing: zero velocities, scripted bodies stay.
     pub fn idle_drives(&self, state: &State) -> Drives {
         Drives {
@@ -39,6 +51,9 @@ impl Model {
             target_poses: state.poses.clone(),
             target_half_spaces: state.half_spaces.clone(),
             systems: Vec::new(),
+            gravity: [0.0; 3],
+            wind: [0.0; 3],
+            attachments: vec![[[0.0; 3]; 2]; self.attachment_count],
         }
     }
 }
@@ -70,6 +85,8 @@ impl Segment<'_> {
         out.positions.clone_from(&self.start.positions);
         out.poses.clone_from(&self.start.poses);
         out.half_spaces.clone_from(&self.start.half_spaces);
+        out.velocities.clear();
+        out.velocities.extend_from_slice(velocities);
         for index in 0..self.model.bodies.len() {
             self.move_body(index, velocities, share, rounded, out);
         }
@@ -82,10 +99,11 @@ impl Segment<'_> {
         let fraction = if share >= 1.0 { self.to } else { self.from + share * (self.to - self.from) };
         match &body.description.kind {
             Kind::Deformable { .. } => {
-                for (vertex, block) in body.vertices.clone().zip(body.blocks.clone()) {
+                for (vertex, block) in body.nodes().zip(body.blocks.clone()) {
                     let x = add_scaled(out.positions[vertex], dt, velocities[block]);
                     out.positions[vertex] = if single { rounded_to_single(x) } else { x };
                 }
+                self.model.carry_points(out, index, single);
             }
             Kind::Rigid { .. } => {
                 let (linear, angular) = (velocities[body.blocks.start], velocities[body.blocks.start + 1]);
@@ -112,7 +130,8 @@ impl Segment<'_> {
         }
     }
 
-    fn scripted(&self, vertex: usize, fraction: f64) -> Vec3 {
+    /// Where a scripted vertex stands at a fraction of the step.
+    pub fn scripted(&self, vertex: usize, fraction: f64) -> Vec3 {
         let (a, b) = (self.step_start.positions[vertex], self.drives.target_positions[vertex]);
         if a == b { a } else { lerp(a, b, fraction) }
     }

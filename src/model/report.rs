@@ -54,9 +54,11 @@ impl Witness {
 /// Microseconds by stage. Not part of any hash.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageTimes {
+    /// Metric; assembly and unconstrained solve of MODEL bodies.
+    pub dynamics: f64,
     /// Proximity and candidate search.
     pub search: f64,
-    /// Rows, frames and metric.
+    /// Rows and frames.
     pub rows: f64,
     /// Constrained dynamics.
     pub solve: f64,

@@ -22,14 +22,17 @@ pub struct State {
     pub poses: Vec<Pose>,
     /// Half-space per body; meaningless for other bodies.
     pub half_spaces: Vec<HalfSpace>,
+    /// Velocity per block `[m/s]`, angular blocks `[rad/s]`: what MODEL bodies start the next step with. Written for all.
+    pub velocities: Vec<Vec3>,
 }
 
 /// What the host asks for in a step: unconstrained velocities and scripted targets.
 #[derive(Clone, Debug, Default)]
 pub struct Drives {
-    /// Displacement velocity `v* = (x* - x0)/dt` per block `[m/s]`; angular blocks `[rad/s]`, world frame.
+    /// Displacement velocity `v* = (x* - x0)/dt` per block `[m/s]`; angular blocks `[rad/s]`, world frame. Not read for
+    /// MODEL bodies.
     pub velocities: Vec<Vec3>,
-    /// End position per vertex; read for kinematic bodies that are not posed.
+    /// End position per vertex; read for kinematic bodies that are not posed, and for pinned nodes of MODEL bodies.
     pub target_positions: Vec<Vec3>,
     /// End pose per body; read for posed kinematic bodies.
     pub target_poses: Vec<Pose>,
@@ -37,6 +40,12 @@ pub struct Drives {
     pub target_half_spaces: Vec<HalfSpace>,
     /// Host matrices of this step.
     pub systems: Vec<System>,
+    /// Acceleration of gravity on MODEL bodies `[m/s^2]`.
+    pub gravity: Vec3,
+    /// Velocity of the air around MODEL bodies `[m/s]`.
+    pub wind: Vec3,
+    /// Targets of springs at the start and the end of the step, by [`super::Body::attachments`] `[m]`.
+    pub attachments: Vec<[Vec3; 2]>,
 }
 
 /// What a step gives back besides the end state.

@@ -1,6 +1,6 @@
 //! Checks of descriptions: what cannot be built, with key, index and value.
 
-use super::{BodyDescription, BuildError, Kind, Materials, Surface, SystemDescription};
+use super::{BodyDescription, BuildError, Dynamics, Kind, Materials, Surface, SystemDescription};
 use crate::math::{determinant, is_finite, is_positive_definite, norm_squared};
 
 fn fail(body: u64, index: usize, value: f64, message: &'static str) -> Result<(), BuildError> {
@@ -63,11 +63,18 @@ fn check_surface(key: u64, surface: &Surface) -> Result<(), BuildError> {
 }
 
 fn check_kind(body: &BodyDescription) -> Result<(), BuildError> {
-    let count = body.surface.rest.len();
+    let carried = body.embedding.as_ref().map_or(0, |e| e.len());
+    let count = body.surface.rest.len().saturating_sub(carried);
+    check_dynamics(body, count)?;
     match &body.kind {
         Kind::Deformable { masses, pinned } => {
             if masses.len() != count || pinned.len() != count {
-                return fail(body.key, masses.len(), count as f64, "one mass and one pin flag per vertex");
+                return fail(body.key, masses.len(), count as f64, "one mass and one pin flag per node");
+            }
+            if let Some(embedding) = &body.embedding
+                && let Some(i) = embedding.nodes.iter().position(|n| n.iter().any(|n| *n as usize >= count))
+            {
+                return fail(body.key, i, f64::from(embedding.nodes[i][0]), "an embedded point names no node");
             }
             match masses.iter().position(|m| !(m.is_finite() && *m > 0.0)) {
                 Some(i) => fail(body.key, i, masses[i], "mass is not positive and finite"),
@@ -96,6 +103,23 @@ fn check_kind(body: &BodyDescription) -> Result<(), BuildError> {
     }
 }
 
+/// Dynamics and embedding fit the kind of the body.
+fn check_dynamics(body: &BodyDescription, count: usize) -> Result<(), BuildError> {
+    let deformable = matches!(body.kind, Kind::Deformable { .. });
+    if body.embedding.is_some() && !deformable {
+        return fail(body.key, 0, 0.0, "only deformable bodies have embedded points");
+    }
+    let fits = match (body.dynamics.as_deref(), &body.kind) {
+        (None, _) => true,
+        (Some(Dynamics::Deformable { pattern, .. }), Kind::Deformable { .. }) => pattern.matrix.rows() == count,
+        (Some(Dynamics::Rigid { linear_damping, angular_damping }), Kind::Rigid { .. }) => {
+            [linear_damping, angular_damping].iter().all(|d| **d >= 0.0 && d.is_finite())
+        }
+        _ => false,
+    };
+    if fits { Ok(()) } else { fail(body.key, 0, count as f64, "the dynamics do not fit the body") }
+}
+
 fn check_system(
     bodies: &[BodyDescription],
     system: &SystemDescription,
@@ -110,8 +134,11 @@ fn check_system(
         if std::mem::replace(&mut claimed[at], true) {
             return fail(*key, index, 0.0, "body is in more than one system");
         }
-        rows += match bodies[at].kind {
-            Kind::Deformable { .. } => bodies[at].surface.rest.len(),
+        if matches!(bodies[at].dynamics.as_deref(), Some(Dynamics::Deformable { .. })) {
+            return fail(*key, index, 0.0, "a deformable body that the library drives has its own matrix");
+        }
+        rows += match &bodies[at].kind {
+            Kind::Deformable { masses, .. } => masses.len(),
             Kind::Rigid { .. } => 2,
             Kind::Kinematic { .. } | Kind::HalfSpace(_) => {
                 return fail(*key, index, 0.0, "a scripted body has no rows in a system");
@@ -154,6 +181,8 @@ mod tests {
             mask: 1,
             self_collision: false,
             precision: Default::default(),
+            embedding: None,
+            dynamics: None,
         }
     }
 

@@ -4,7 +4,7 @@ use super::surface::surface;
 use super::{Fault, Topology, World, WorldError, ids};
 use crate::kinematics::{Pose, place_vertices};
 use crate::math::{Mat3, Vec3, ZERO, is_finite, mat_mul, norm, transpose};
-use crate::model::{BodyDescription, HalfSpace, Kind, Precision, Surface};
+use crate::model::{BodyDescription, Dynamics, HalfSpace, Kind, Precision, Surface};
 use std::sync::Arc;
 
 /// What every kind of body has.
@@ -78,6 +78,9 @@ pub struct RigidDescription {
     pub velocity: Vec3,
     /// Angular displacement velocity `[rad/s]`, world axes.
     pub angular_velocity: Vec3,
+    /// Whether the library drives it, and the rates at which linear and angular velocity then decay `[1/s]`. The
+    /// velocities are then those at the start.
+    pub own_dynamics: Option<[f64; 2]>,
 }
 
 /// A body of prescribed motion and infinite mass.
@@ -115,11 +118,14 @@ pub(super) struct Body {
     /// Whether a step has ended in, or been given, this state.
     pub stepped: bool,
     pub certified: Option<Certified>,
-    /// Displacement velocity per block.
+    /// Displacement velocity per block; of MODEL bodies the velocity at the start of the next step.
     pub velocities: Vec<Vec3>,
     /// Where prescribed motion ends; `None`: it stays.
     pub target_positions: Option<Vec<Vec3>>,
     pub target_pose: Option<Pose>,
+    /// Where springs to targets pull at the start of the next step, and at its end if that was pushed.
+    pub attachments: Vec<Vec3>,
+    pub attachment_targets: Option<Vec<Vec3>>,
     pub target_half_space: Option<HalfSpace>,
     /// Results of the last step, per block; empty before the first.
     pub result_velocities: Vec<Vec3>,
@@ -133,10 +139,20 @@ impl Body {
     /// Number of blocks.
     pub fn blocks(&self) -> usize {
         match &self.description.kind {
-            Kind::Deformable { .. } => self.description.surface.rest.len(),
+            Kind::Deformable { masses, .. } => masses.len(),
             Kind::Rigid { .. } => 2,
             Kind::Kinematic { .. } | Kind::HalfSpace(_) => 0,
         }
+    }
+
+    /// Where the nodes of a deformable body begin among its positions: after the points that they carry.
+    pub fn first_node(&self) -> usize {
+        self.description.embedding.as_ref().map_or(0, |embedding| embedding.len())
+    }
+
+    /// Number of vertices that collide or could: embedded points, or else all.
+    pub fn vertex_count(&self) -> usize {
+        if self.description.embedding.is_some() { self.first_node() } else { self.description.surface.rest.len() }
     }
 
     /// Whether the body has a pose.
@@ -155,7 +171,7 @@ impl Body {
         }
     }
 
-    fn new(options: &BodyOptions, kind: Kind, surface: Surface) -> Body {
+    pub(super) fn new(options: &BodyOptions, kind: Kind, surface: Surface) -> Body {
         let half_space = if let Kind::HalfSpace(plane) = &kind { *plane } else { NO_HALF_SPACE };
         let description = BodyDescription {
             key: 0,
@@ -167,6 +183,8 @@ impl Body {
             mask: options.mask,
             self_collision: options.self_collision,
             precision: options.precision,
+            embedding: None,
+            dynamics: None,
         };
         Body {
             description,
@@ -180,6 +198,8 @@ impl Body {
             velocities: Vec::new(),
             target_positions: None,
             target_pose: None,
+            attachments: Vec::new(),
+            attachment_targets: None,
             target_half_space: None,
             result_velocities: Vec::new(),
             result_end_velocities: Vec::new(),
@@ -234,6 +254,13 @@ impl World {
         let surface = surface(vertices, topology)?;
         let mut body = Body::new(&options, Kind::Rigid { mass, inertia }, surface);
         body.velocities = vec![description.velocity, description.angular_velocity];
+        if let Some([linear_damping, angular_damping]) = description.own_dynamics {
+            if let Some(rate) = [linear_damping, angular_damping].iter().find(|d| !(**d >= 0.0 && d.is_finite())) {
+                let fault = if rate.is_finite() { Fault::InvalidArgument } else { Fault::NonFinite };
+                return Err(WorldError::new(fault, "a damping rate is finite and not negative").value(*rate));
+            }
+            body.description.dynamics = Some(Arc::new(Dynamics::Rigid { linear_damping, angular_damping }));
+        }
         self.insert_posed(&options, body, pose)
     }
 
@@ -264,7 +291,7 @@ impl World {
         self.insert(options, body)
     }
 
-    fn insert(&mut self, options: &BodyOptions, mut body: Body) -> Result<u64, WorldError> {
+    pub(super) fn insert(&mut self, options: &BodyOptions, mut body: Body) -> Result<u64, WorldError> {
         if let Some(half_thickness) = body.description.half_thickness
             && !(half_thickness >= 0.0 && half_thickness.is_finite())
         {

@@ -1,6 +1,7 @@
 //! What a host pushes before a step: start states, displacement velocities, targets.
 
 use super::body::{Body, Certified, check_masses, checked_half_space, checked_pose, round_all};
+use super::model_body::with_points;
 use super::{Fault, World, WorldError};
 use crate::kinematics::Pose;
 use crate::math::Vec3;
@@ -11,13 +12,27 @@ impl World {
     ///
     /// Positions that differ from the state in which the last step ended are swept-checked by the next step, unless
     /// `teleport` says that the body jumps.
-    pub fn push_positions(&mut self, id: u64, mut positions: Vec<Vec3>, teleport: bool) -> Result<(), WorldError> {
+    pub fn push_positions(&mut self, id: u64, positions: Vec<Vec3>, teleport: bool) -> Result<(), WorldError> {
         let body = self.bodies.get_mut(id)?;
         if body.posed() || matches!(body.description.kind, Kind::HalfSpace(_)) {
             return Err(unsupported("this kind of body has no start positions: push its pose or plane").object(id));
         }
-        check_count(positions.len(), body.positions.len(), "positions").map_err(|e| e.object(id))?;
+        if body.description.embedding.is_some() {
+            return Err(unsupported("the vertices of this body are carried by its nodes: push those").object(id));
+        }
+        self.push_node_positions(id, positions, teleport)
+    }
+
+    /// Sets the start positions of the nodes of a deformable body: of its vertices, or of what carries them. As positions.
+    pub fn push_node_positions(&mut self, id: u64, mut positions: Vec<Vec3>, teleport: bool) -> Result<(), WorldError> {
+        let body = self.bodies.get_mut(id)?;
+        if body.posed() || matches!(body.description.kind, Kind::HalfSpace(_)) {
+            return Err(unsupported("this kind of body has no nodes").object(id));
+        }
+        let count = body.positions.len() - body.first_node();
+        check_count(positions.len(), count, "positions").map_err(|e| e.object(id))?;
         round_all(&mut positions, body.description.precision, "position").map_err(|e| e.object(id))?;
+        let positions = with_points(body.description.embedding.as_deref(), positions, body.description.precision);
         body.before_push(teleport, body.positions == positions);
         body.positions = positions;
         Ok(())
@@ -85,12 +100,27 @@ impl World {
     /// Sets the end positions of the next step of a kinematic body without a pose.
     pub fn push_target_positions(&mut self, id: u64, mut targets: Vec<Vec3>) -> Result<(), WorldError> {
         let body = self.bodies.get_mut(id)?;
-        if !matches!(body.description.kind, Kind::Kinematic { posed: false }) {
-            return Err(unsupported("only kinematic bodies without a pose have target positions").object(id));
+        let own = body.description.dynamics.is_some() && matches!(body.description.kind, Kind::Deformable { .. });
+        if !own && !matches!(body.description.kind, Kind::Kinematic { posed: false }) {
+            let message = "only kinematic bodies without a pose, and nodes of MODEL bodies, have target positions";
+            return Err(unsupported(message).object(id));
         }
-        check_count(targets.len(), body.positions.len(), "target positions").map_err(|e| e.object(id))?;
+        let count = body.positions.len() - body.first_node();
+        check_count(targets.len(), count, "target positions").map_err(|e| e.object(id))?;
         round_all(&mut targets, body.description.precision, "target position").map_err(|e| e.object(id))?;
         body.target_positions = Some(targets);
+        Ok(())
+    }
+
+    /// Sets where the springs to targets of a MODEL body pull at the end of the next step; between, the way is straight.
+    pub fn push_attachment_targets(&mut self, id: u64, targets: Vec<Vec3>) -> Result<(), WorldError> {
+        let body = self.bodies.get_mut(id)?;
+        if body.attachments.is_empty() {
+            return Err(unsupported("the body has no springs to targets").object(id));
+        }
+        check_count(targets.len(), body.attachments.len(), "spring targets").map_err(|e| e.object(id))?;
+        check_finite(&targets, "spring target").map_err(|e| e.object(id))?;
+        body.attachment_targets = Some(targets);
         Ok(())
     }
 

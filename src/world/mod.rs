@@ -5,6 +5,7 @@
 //! * `surface`: collision surfaces from lists of triangles, edges and points
 //! * `body`: bodies and their descriptions
 //! * `material`: materials and pair overrides
+//! * `model_body`, `model_archive`: bodies that the library drives, and bodies of tetrahedra; their snapshots
 //! * `system`: host matrices
 //! * `drive`: what is pushed before a step
 //! * `step`: the step
@@ -18,6 +19,8 @@ mod drive;
 mod error;
 mod ids;
 mod material;
+mod model_archive;
+mod model_body;
 mod query;
 mod snapshot;
 mod step;
@@ -26,6 +29,7 @@ mod system;
 
 pub use body::{BodyOptions, DeformableDescription, KinematicDescription, RigidDescription};
 pub use error::{Fault, WorldError};
+pub use model_body::{NodeForces, SheetDescription, SheetModel, SolidDescription};
 pub use query::{BodyInfo, BodyKind, Outcome};
 pub use snapshot::SNAPSHOT_FORMAT;
 pub use step::StepFailure;
@@ -33,6 +37,7 @@ pub use surface::Topology;
 pub use system::SymmetrySlack;
 
 use crate::implicit_contact::{Memory, Scratch};
+use crate::math::Vec3;
 use crate::model::{ContactRecord, Drives, Material, Model, State, StepResult, Witness};
 use ids::{IdKind, Slots};
 
@@ -45,6 +50,8 @@ pub struct World {
     overrides: Vec<(u64, u64, f64)>,
     model: Model,
     model_current: bool,
+    gravity: Vec3,
+    wind: Vec3,
     state: State,
     drives: Drives,
     result: StepResult,
@@ -71,6 +78,8 @@ impl World {
             overrides: Vec::new(),
             model: Model::default(),
             model_current: false,
+            gravity: [0.0; 3],
+            wind: [0.0; 3],
             state: State::default(),
             drives: Drives::default(),
             result: StepResult::default(),

@@ -35,7 +35,8 @@ pub struct BodyInfo {
     pub edges: usize,
     /// Triangles.
     pub triangles: usize,
-    /// Entries that velocities and impulses have: one per vertex, or one for a rigid body, or none.
+    /// Entries that velocities and impulses have: one per node (a vertex, or a node of the tetrahedra that carry the
+    /// vertices), or one for a rigid body, or none.
     pub velocities: usize,
     /// Half thickness in use `[m]`.
     pub half_thickness: f64,
@@ -60,7 +61,7 @@ impl World {
         let body = self.bodies.get(id)?;
         let surface = &body.description.surface;
         let (kind, velocities) = match body.description.kind {
-            Kind::Deformable { .. } => (BodyKind::Deformable, surface.rest.len()),
+            Kind::Deformable { .. } => (BodyKind::Deformable, body.blocks()),
             Kind::Rigid { .. } => (BodyKind::Rigid, 1),
             Kind::Kinematic { posed: true } => (BodyKind::KinematicPosed, 0),
             Kind::Kinematic { posed: false } => (BodyKind::KinematicMesh, 0),
@@ -69,7 +70,7 @@ impl World {
         let default = || crate::model::default_half_thickness(surface);
         Ok(BodyInfo {
             kind,
-            vertices: surface.rest.len(),
+            vertices: body.vertex_count(),
             edges: surface.edges.len(),
             triangles: surface.faces.len(),
             velocities,
@@ -90,7 +91,17 @@ impl World {
 
     /// Positions of the vertices: certified after a step, as pushed before it.
     pub fn positions(&self, id: u64) -> Result<&[Vec3], WorldError> {
-        Ok(&self.bodies.get(id)?.positions)
+        let body = self.bodies.get(id)?;
+        Ok(&body.positions[..body.vertex_count().min(body.positions.len())])
+    }
+
+    /// Positions of the nodes of a deformable body: its vertices, or what carries them.
+    pub fn node_positions(&self, id: u64) -> Result<&[Vec3], WorldError> {
+        let body = self.bodies.get(id)?;
+        match body.description.kind {
+            Kind::Deformable { .. } => Ok(&body.positions[body.first_node()..]),
+            _ => Err(without("nodes", id)),
+        }
     }
 
     /// Pose of a rigid or posed kinematic body.

@@ -2,7 +2,7 @@
 //!
 //! Layout, little-endian: the magic number, the format version (`u32`), the length of the rest and its checksum (`u64`
 //! each), then the sections: slots and bodies, slots and materials, pair frictions, slots and systems, the method's memory,
-//! the contacts of the last step. What names something names it by key, without the tag of a world.
+//! the contacts of the last step, gravity and wind. What names something names it by key, without the tag of a world.
 //!
 //! What is not in it: witnesses, buffers, and that the state was certified. The first step after loading certifies its
 //! start again, so that not even a forged snapshot makes a step start from an intersection unseen.
@@ -18,7 +18,8 @@ use crate::kinematics::Pose;
 use crate::math::{is_finite, norm_squared};
 use crate::mesh::Surface;
 use crate::model::{
-    BodyDescription, CombineRule, ContactRecord, HalfSpace, Kind, Material, Model, Precision, State, StepResult,
+    BodyDescription, CombineRule, ContactRecord, Dynamics, HalfSpace, Kind, Material, Model, Precision, State,
+    StepResult,
 };
 use std::sync::Arc;
 
@@ -62,6 +63,8 @@ archive_struct!(BodyDescription {
     mask,
     self_collision,
     precision,
+    embedding,
+    dynamics,
 });
 archive_struct!(Body {
     description,
@@ -76,6 +79,8 @@ archive_struct!(Body {
     target_positions,
     target_pose,
     target_half_space,
+    attachments,
+    attachment_targets,
     result_velocities,
     result_end_velocities,
     result_impulses,
@@ -202,6 +207,8 @@ impl World {
         save_slots(&self.systems, out);
         self.memory.save(out);
         self.contacts.save(out);
+        self.gravity.save(out);
+        self.wind.save(out);
     }
 
     /// The world of the sections, unchecked.
@@ -211,7 +218,7 @@ impl World {
         let overrides: Vec<(u64, u64, f64)> = Archive::load(source)?;
         let systems: Slots<HostSystem> = load_slots(&self.systems, source)?;
         let memory = Memory::load(source)?;
-        let contacts = Archive::load(source)?;
+        let (contacts, gravity, wind) = Archive::load(source)?;
         if source.remaining() > 0 {
             return Err(source.mismatch("bytes follow the last section", source.remaining() as f64));
         }
@@ -224,6 +231,8 @@ impl World {
             model_current: false,
             state: State::default(),
             drives: Default::default(),
+            gravity,
+            wind,
             result: StepResult::default(),
             memory,
             scratch: Scratch::default(),
@@ -257,6 +266,9 @@ impl World {
         for (id, system) in self.systems.iter() {
             self.check_system(id, system).map_err(|error| mismatch(error).object(id))?;
         }
+        if !(is_finite(self.gravity) && is_finite(self.wind)) {
+            return Err(damaged("gravity or wind is not finite"));
+        }
         self.check_memory()
     }
 
@@ -265,8 +277,9 @@ impl World {
         for (index, body) in system.bodies.iter().enumerate() {
             let twice = self.in_system(*body, Some(own)) || system.bodies[..index].contains(body);
             let body = self.bodies.get(self.bodies.id_of_key(*body))?;
-            if twice || body.blocks() == 0 {
-                return Err(damaged("a system names a body of prescribed motion, or one that is named twice"));
+            let own = matches!(body.description.dynamics.as_deref(), Some(Dynamics::Deformable { .. }));
+            if twice || own || body.blocks() == 0 {
+                return Err(damaged("a system names a body that has no rows in it, or one that is named twice"));
             }
             rows += body.blocks();
         }
@@ -313,6 +326,8 @@ impl World {
         hash_values(&self.systems, &mut hash);
         self.memory.save(&mut hash);
         self.contacts.save(&mut hash);
+        self.gravity.save(&mut hash);
+        self.wind.save(&mut hash);
         hash.value()
     }
 }
@@ -350,6 +365,31 @@ fn damaged(message: &str) -> WorldError {
 }
 
 impl Body {
+    /// Dynamics and embedding that fit the body.
+    fn check_dynamics(&self) -> Result<(), WorldError> {
+        let d = &self.description;
+        if let Some(embedding) = &d.embedding {
+            let inside = |nodes: &[u32; 4]| nodes.iter().all(|node| (*node as usize) < self.blocks());
+            let finite = embedding.weights.as_flattened().iter().all(|w| w.is_finite());
+            let fits = embedding.nodes.len() == embedding.weights.len() && embedding.nodes.iter().all(inside);
+            if !(fits && finite && matches!(d.kind, Kind::Deformable { .. })) {
+                return Err(damaged("embedded points do not fit their body"));
+            }
+        }
+        let rate = |r: f64| r >= 0.0 && r.is_finite();
+        let fits = match (d.dynamics.as_deref(), &d.kind) {
+            (None, _) => true,
+            (Some(Dynamics::Deformable { pattern, .. }), Kind::Deformable { .. }) => {
+                pattern.matrix.rows() == self.blocks()
+            }
+            (Some(Dynamics::Rigid { linear_damping, angular_damping }), Kind::Rigid { .. }) => {
+                rate(*linear_damping) && rate(*angular_damping)
+            }
+            _ => false,
+        };
+        if fits { Ok(()) } else { Err(damaged("dynamics do not fit their body")) }
+    }
+
     /// What the function that made the body, and those that pushed to it, would have refused.
     fn check_loaded(&self) -> Result<(), WorldError> {
         let d = &self.description;
@@ -363,10 +403,12 @@ impl Body {
         if d.half_thickness.is_some_and(|h| !(h.is_finite() && h >= 0.0)) {
             return Err(damaged("a half thickness is out of range"));
         }
+        self.check_dynamics()?;
         match &d.kind {
             Kind::Deformable { masses, pinned } => {
-                if masses.len() != count || pinned.len() != count {
-                    return Err(damaged("masses or pin flags do not fit the vertices of a body"));
+                let nodes = count.saturating_sub(self.first_node());
+                if masses.len() != nodes || pinned.len() != nodes {
+                    return Err(damaged("masses or pin flags do not fit the nodes of a body"));
                 }
                 check_masses(masses)?;
             }
@@ -380,7 +422,9 @@ impl Body {
             }
         }
         let mut lists = vec![(&self.positions, count), (&self.velocities, blocks)];
-        lists.extend(self.target_positions.as_ref().map(|targets| (targets, count)));
+        lists.extend(self.target_positions.as_ref().map(|targets| (targets, count.saturating_sub(self.first_node()))));
+        lists.push((&self.attachments, d.dynamics.as_ref().map_or(0, |dynamics| dynamics.attachments())));
+        lists.extend(self.attachment_targets.as_ref().map(|targets| (targets, self.attachments.len())));
         lists.extend(self.certified.as_ref().map(|certified| (&certified.positions, count)));
         for results in [&self.result_velocities, &self.result_end_velocities, &self.result_impulses] {
             lists.push((results, if results.is_empty() { 0 } else { blocks }));

@@ -92,12 +92,16 @@ impl World {
         drives.target_positions.clone_from(&self.state.positions);
         drives.target_poses.clone_from(&self.state.poses);
         drives.target_half_spaces.clone_from(&self.state.half_spaces);
+        (drives.gravity, drives.wind) = (self.gravity, self.wind);
+        drives.attachments.clear();
         for (index, body) in self.model.bodies.iter().enumerate() {
             let kept = self.bodies.get(self.bodies.id_of_key(body.description.key))?;
             drives.velocities[body.blocks.clone()].copy_from_slice(&kept.velocities);
             if let Some(targets) = &kept.target_positions {
-                drives.target_positions[body.vertices.clone()].copy_from_slice(targets);
+                drives.target_positions[body.vertices.end - targets.len()..body.vertices.end].copy_from_slice(targets);
             }
+            let ends = kept.attachment_targets.as_ref().unwrap_or(&kept.attachments);
+            drives.attachments.extend(kept.attachments.iter().zip(ends).map(|(start, end)| [*start, *end]));
             if let Some(pose) = kept.target_pose {
                 drives.target_poses[index] = pose;
             }
@@ -124,6 +128,7 @@ impl World {
             let id = self.bodies.id_of_key(body.description.key);
             if let Ok(kept) = self.bodies.get(id) {
                 place(kept, index, body.vertices.clone(), &mut self.state);
+                self.state.velocities[body.blocks.clone()].copy_from_slice(&kept.velocities);
             }
         }
     }
@@ -177,6 +182,12 @@ impl World {
             kept.target_positions = None;
             kept.target_pose = None;
             kept.target_half_space = None;
+            if let Some(targets) = kept.attachment_targets.take() {
+                kept.attachments = targets;
+            }
+            if kept.description.dynamics.is_some() {
+                kept.velocities.copy_from_slice(&self.state.velocities[body.blocks.clone()]);
+            }
             for (kept, all) in [
                 (&mut kept.result_velocities, &self.result.velocities),
                 (&mut kept.result_end_velocities, &self.result.end_velocities),
@@ -202,7 +213,9 @@ impl World {
                 self.witnessed(WorldError::new(Fault::IntersectingStart, "the start state intersects"))
             }
             StepError::SingularSystem { system, row } => {
-                let id = self.systems.iter().nth(system).map_or(0, |(id, _)| id);
+                let own = self.model.systems.get(system).and_then(|s| s.bodies.first());
+                let own = own.filter(|_| system >= self.model.host_systems).map(|key| self.bodies.id_of_key(*key));
+                let id = self.systems.iter().nth(system).map(|(id, _)| id).or(own).unwrap_or(0);
                 let message = format!("the matrix is not positive definite at block row {row}");
                 WorldError::new(Fault::SingularSystem, message).object(id).index(row)
             }

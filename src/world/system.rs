@@ -2,7 +2,7 @@
 
 use super::{Fault, World, WorldError, ids};
 use crate::math::Mat3;
-use crate::model::{Kind, SystemDescription};
+use crate::model::{Dynamics, Kind, SystemDescription};
 
 /// A system as the world keeps it.
 pub(super) struct HostSystem {
@@ -41,6 +41,10 @@ impl World {
             let body = self.bodies.get(*id).map_err(|error| error.index(index))?;
             if !matches!(body.description.kind, Kind::Deformable { .. } | Kind::Rigid { .. }) {
                 let message = "a system is over deformable and rigid bodies only";
+                return Err(WorldError::new(Fault::InvalidArgument, message).object(*id).index(index));
+            }
+            if matches!(body.description.dynamics.as_deref(), Some(Dynamics::Deformable { .. })) {
+                let message = "a deformable body that the library drives has a matrix of its own";
                 return Err(WorldError::new(Fault::InvalidArgument, message).object(*id).index(index));
             }
             if self.in_system(ids::key(*id), None) || bodies[..index].contains(id) {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// Files of `src/capi` in the order of the header.
-const SOURCES: [&str; 14] = [
+const SOURCES: [&str; 15] = [
     "status",
     "version",
     "views",
@@ -13,6 +13,7 @@ const SOURCES: [&str; 14] = [
     "shape",
     "description",
     "body",
+    "model",
     "drive",
     "system",
     "step",

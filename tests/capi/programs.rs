@@ -21,6 +21,18 @@ fn the_smallest_host_puts_a_cloth_on_the_ground() {
     assert!(last.starts_with("t = 0.50 s: height 0.0"), "{text}");
 }
 
+#[test]
+fn a_cloth_that_the_library_drives_drapes_over_a_soft_ball() {
+    let text = run("examples/c/model_cloth.c", Standard::C99, &[]);
+    assert_eq!(text.lines().last(), Some("intersections: 0"), "{text}");
+    assert_eq!(text.lines().count(), 7, "{text}");
+}
+
+#[test]
+fn bodies_of_the_library_through_the_c_abi() {
+    passes("model.c", Standard::C99);
+}
+
 fn passes(name: &str, standard: Standard) {
     let text = run(&format!("tests/capi/programs/{name}"), standard, &[]);
     assert!(text.lines().any(|line| line == "PASS"), "{name}:\n{text}");

@@ -53,6 +53,7 @@ fn scene() -> Scene {
             pose,
             velocity: [0.0; 3],
             angular_velocity: [0.0, 1.0, 0.0],
+            own_dynamics: None,
         })
         .unwrap();
     let vertices = vec![[0.0, 0.0, 0.4], [0.4, 0.0, 0.4], [0.0, 0.4, 0.4]];

@@ -83,6 +83,8 @@ impl Plan {
             mask: 1,
             self_collision: false,
             precision: Precision::Double,
+            embedding: None,
+            dynamics: None,
         });
         key
     }

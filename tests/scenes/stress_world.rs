@@ -87,6 +87,8 @@ pub fn assemble(
             mask: p.mask,
             self_collision: p.itself,
             precision: if p.single { Precision::Single } else { Precision::Double },
+            embedding: None,
+            dynamics: None,
         });
     }
     let list =

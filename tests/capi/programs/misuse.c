@@ -83,6 +83,9 @@ static void null_pointers(void) {
   SgnDeformableDesc deformable = cloth_desc(&cloth);
   SgnRigidDesc rigid = octahedron_desc(1, 2);
   SgnKinematicDesc kinematic;
+  SgnSheetDesc sheet;
+  SgnSolidDesc solid;
+  const double field[3] = {0, 0, -1};
   SgnHalfSpaceDesc half_space;
   SgnMaterialDesc material;
   SgnSystemDesc system = diagonal_desc(&f.cloth);
@@ -110,6 +113,8 @@ static void null_pointers(void) {
   NULLED(sgn_deformable_desc_init(NULL, sizeof deformable));
   NULLED(sgn_rigid_desc_init(NULL, sizeof rigid));
   NULLED(sgn_kinematic_desc_init(NULL, sizeof kinematic));
+  NULLED(sgn_sheet_desc_init(NULL, sizeof sheet));
+  NULLED(sgn_solid_desc_init(NULL, sizeof solid));
   NULLED(sgn_half_space_desc_init(NULL, sizeof half_space));
   NULLED(sgn_shape_desc_init(NULL, sizeof shape));
   NULLED(sgn_system_desc_init(NULL, sizeof system));
@@ -159,6 +164,18 @@ static void null_pointers(void) {
   NULLED(sgn_kinematic_create(NULL, &kinematic, &body));
   NULLED(sgn_kinematic_create(f.world, NULL, &body));
   NULLED(sgn_kinematic_create(f.world, &kinematic, NULL));
+  OK(sgn_sheet_desc_init(&sheet, sizeof sheet));
+  NULLED(sgn_sheet_create(NULL, &sheet, &body));
+  NULLED(sgn_sheet_create(f.world, NULL, &body));
+  NULLED(sgn_sheet_create(f.world, &sheet, NULL));
+  OK(sgn_solid_desc_init(&solid, sizeof solid));
+  NULLED(sgn_solid_create(NULL, &solid, &body));
+  NULLED(sgn_solid_create(f.world, NULL, &body));
+  NULLED(sgn_solid_create(f.world, &solid, NULL));
+  NULLED(sgn_world_set_gravity(NULL, field));
+  NULLED(sgn_world_set_gravity(f.world, NULL));
+  NULLED(sgn_world_set_wind(NULL, field));
+  NULLED(sgn_world_set_wind(f.world, NULL));
   OK(sgn_half_space_desc_init(&half_space, sizeof half_space));
   NULLED(sgn_half_space_create(NULL, &half_space, &body));
   NULLED(sgn_half_space_create(f.world, NULL, &body));
@@ -314,6 +331,8 @@ static void wrong_structs(void) {
   SIZES(SgnDeformableDesc, sgn_deformable_desc_init, sgn_deformable_create(f.world, desc, &body));
   SIZES(SgnRigidDesc, sgn_rigid_desc_init, sgn_rigid_create(f.world, desc, &body));
   SIZES(SgnKinematicDesc, sgn_kinematic_desc_init, sgn_kinematic_create(f.world, desc, &body));
+  SIZES(SgnSheetDesc, sgn_sheet_desc_init, sgn_sheet_create(f.world, desc, &body));
+  SIZES(SgnSolidDesc, sgn_solid_desc_init, sgn_solid_create(f.world, desc, &body));
   SIZES(SgnHalfSpaceDesc, sgn_half_space_desc_init, sgn_half_space_create(f.world, desc, &body));
   SIZES(SgnSystemDesc, sgn_system_desc_init, sgn_system_create(f.world, desc, &system));
   SIZES(SgnStepDesc, sgn_step_desc_init, sgn_world_step(f.world, desc, NULL));

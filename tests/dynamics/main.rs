@@ -1,0 +1,6 @@
+//! Bodies that the library drives, against closed forms and other integrators; and together with what hosts drive.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod closed_forms;
+mod contact;
+mod scenes;
