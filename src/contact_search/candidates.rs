@@ -13,6 +13,8 @@ pub struct CandidateSearch {
     broad_phase: Option<(u64, BroadPhase)>,
     candidates: Candidates,
     anchor: Option<Anchor>,
+    /// Only its edge-face pairs are used.
+    certificate: Candidates,
 }
 
 /// What the present candidates were found for.
@@ -42,20 +44,10 @@ impl CandidateSearch {
         if self.anchor.as_ref().is_some_and(|anchor| anchor.holds(model, filter, x0, x1, factor)) {
             return &self.candidates;
         }
-        let radius: Vec<f64> =
-            model.vertex_body.iter().map(|b| (factor + 1.0) * model.bodies[*b as usize].half_thickness).collect();
-        let primitives = primitives(model);
-        let fresh = self.broad_phase.as_ref().is_none_or(|(topology, _)| *topology != model.topology_hash);
-        if fresh {
-            self.broad_phase = None;
-        }
-        let (_, broad_phase) =
-            self.broad_phase.get_or_insert_with(|| (model.topology_hash, BroadPhase::build(&primitives)));
+        let radius = half_thicknesses(model, factor + 1.0);
+        let broad_phase = tree(&mut self.broad_phase, model);
         broad_phase.refit(x0, x1, &radius, par);
-        let allowed = |a: u32, b: u32| {
-            filter.allows(model.vertex_body[a as usize] as usize, model.vertex_body[b as usize] as usize)
-        };
-        broad_phase.candidates(&allowed, &mut self.candidates, par);
+        broad_phase.candidates(&|a, b| allowed(model, filter, a, b), &mut self.candidates, par);
         self.anchor = Some(Anchor {
             topology: model.topology_hash,
             filter: filter.fingerprint(),
@@ -66,12 +58,32 @@ impl CandidateSearch {
         &self.candidates
     }
 
+    /// Edge-face pairs whose boxes overlap at `x`, by the same tree.
+    pub fn edge_faces(&mut self, model: &Model, filter: &BodyFilter, x: &[Vec3], par: Par) -> &[[u32; 2]] {
+        let broad_phase = tree(&mut self.broad_phase, model);
+        broad_phase.refit(x, x, &[], par);
+        broad_phase.edge_face_candidates(&|a, b| allowed(model, filter, a, b), &mut self.certificate, par);
+        &self.certificate.edge_face
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let c = &self.candidates;
-        8 * (c.vertex_face.capacity() + c.edge_edge.capacity() + c.edge_face.capacity())
+        8 * (c.vertex_face.capacity() + c.edge_edge.capacity() + self.certificate.edge_face.capacity())
             + self.anchor.as_ref().map_or(0, |a| 24 * (a.x0.capacity() + a.x1.capacity()))
     }
+}
+
+/// The tree of a model, built where there is none of this topology.
+fn tree<'a>(kept: &'a mut Option<(u64, BroadPhase)>, model: &Model) -> &'a mut BroadPhase {
+    if kept.as_ref().is_some_and(|(topology, _)| *topology != model.topology_hash) {
+        *kept = None;
+    }
+    &mut kept.get_or_insert_with(|| (model.topology_hash, BroadPhase::build(&primitives(model)))).1
+}
+
+fn allowed(model: &Model, filter: &BodyFilter, a: u32, b: u32) -> bool {
+    filter.allows(model.vertex_body[a as usize] as usize, model.vertex_body[b as usize] as usize)
 }
 
 impl Anchor {
@@ -92,4 +104,9 @@ impl Anchor {
 /// The collision primitives of a model.
 pub fn primitives(model: &Model) -> Primitives<'_> {
     Primitives { vertices: &model.contact_vertices, edges: &model.edges, faces: &model.faces }
+}
+
+/// `factor` times the half thickness of every vertex's body `[m]`.
+pub(super) fn half_thicknesses(model: &Model, factor: f64) -> Vec<f64> {
+    model.vertex_body.iter().map(|b| factor * model.bodies[*b as usize].half_thickness).collect()
 }

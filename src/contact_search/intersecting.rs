@@ -24,12 +24,23 @@ pub struct Tangle {
 /// All intersections of a state between features that the filter lets collide, by exact predicates.
 ///
 /// Features of one surface that touch at rest already do not count. Cost: a broad phase and an exact test per
-/// edge-face pair with overlapping boxes.
+/// edge-face pair with overlapping boxes that no direction separates.
 pub fn intersections(model: &Model, filter: &BodyFilter, state: &State, par: Par) -> Tangle {
+    intersections_with(&mut CandidateSearch::default(), model, filter, state, par)
+}
+
+/// [`intersections`] with the tree and the buffers of an earlier search.
+pub fn intersections_with(
+    search: &mut CandidateSearch,
+    model: &Model,
+    filter: &BodyFilter,
+    state: &State,
+    par: Par,
+) -> Tangle {
     let mut tangle = Tangle::default();
     let body_of = |v: u32| model.vertex_body[v as usize] as usize;
-    let allowed = |a: u32, b: u32| filter.allows(body_of(a), body_of(b));
-    for found in intersection::find(&primitives(model), &state.positions, &allowed, par) {
+    let pairs = search.edge_faces(model, filter, &state.positions, par);
+    for found in intersection::among(&primitives(model), pairs, &state.positions, par) {
         let (edge, face) = (model.edges[found.edge as usize], model.faces[found.face as usize]);
         let bodies = [body_of(edge[0]), body_of(face[0])];
         if bodies[0] == bodies[1] && touches_at_rest(model, edge, face) {

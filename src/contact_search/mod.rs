@@ -3,7 +3,7 @@
 //!
 //! * `pair`: primitive pairs of a model, which may touch, thickness, persistent keys
 //! * `contact`: the contact record with its gap
-//! * `candidates`: broad phase over a segment, kept while it holds
+//! * `candidates`: broad phase over a segment, kept while it holds, and at one state for the certificate
 //! * `near`: contacts near the start
 //! * `swept`: continuous detection over a segment
 //! * `passing`: tangled vertices, whose pairs pass
@@ -19,7 +19,7 @@ mod swept;
 
 pub use candidates::{CandidateSearch, primitives};
 pub use contact::{Contact, half_space_contact, mesh_contact};
-pub use intersecting::{Tangle, intersections, swept_free};
+pub use intersecting::{Tangle, intersections, intersections_with, swept_free};
 pub use near::near_contacts;
 pub use pair::{
     BodyFilter, ClosestPoints, ContactKey, Pair, PairKind, REST_DISTANCE_FRACTION, distance_along, gather,

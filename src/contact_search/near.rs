@@ -1,9 +1,10 @@
 //! Contacts near the start positions of a segment [Otaduy09, §3.2 (i)].
 
+use super::candidates::{half_thicknesses, primitives};
 use super::contact::{Contact, half_space_contact, mesh_contact};
 use super::pair::{BodyFilter, Pair, PairKind, gather};
 use super::passing::Passing;
-use crate::detection::Candidates;
+use crate::detection::{Candidates, screening};
 use crate::math::{Vec3, dot, scale};
 use crate::model::{Kind, Model, State};
 use crate::parallel::Par;
@@ -23,9 +24,10 @@ pub fn near_contacts(
     factor: f64,
     par: Par,
 ) -> Vec<Contact> {
-    let pairs = (candidates.vertex_face.len(), candidates.edge_edge.len());
-    let found = par.map_indexed(pairs.0 + pairs.1, |i| {
-        near_mesh_pair(model, passing, candidate(candidates, i), &start.positions, factor)
+    let x = &start.positions;
+    let open = screening::near(x, &primitives(model), candidates, &half_thicknesses(model, factor), par);
+    let found = par.map_indexed(open.len(), |i| {
+        near_mesh_pair(model, passing, candidate(candidates, open[i] as usize), x, factor)
     });
     let mut contacts = distinct(found.into_iter().flatten().collect());
     for pair in half_space_pairs(model, filter) {

@@ -1,14 +1,14 @@
 //! Continuous detection of a segment: which pairs come closer than their minimum separation on straight chords.
 
-use super::candidates::primitives;
+use super::candidates::{half_thicknesses, primitives};
 use super::contact::{Contact, half_space_contact, mesh_contact};
 use super::near::{candidate, half_space_pairs};
 use super::pair::{BodyFilter, Pair, PairKind, gather};
 use super::passing::Passing;
-use crate::detection::Candidates;
 use crate::detection::ccd::{self, Separation};
+use crate::detection::{Candidates, screening};
 use crate::math::predicates::plane_side;
-use crate::math::{Vec3, lerp, norm_squared, sub};
+use crate::math::{Vec3, lerp};
 use crate::model::{Model, State, Witness};
 use crate::parallel::Par;
 
@@ -51,9 +51,10 @@ pub fn swept_hits(
     end: &State,
     par: Par,
 ) -> Vec<Hit> {
-    let count = candidates.vertex_face.len() + candidates.edge_edge.len();
     let (x0, x1) = (&start.positions[..], &end.positions[..]);
-    let found = par.map_indexed(count, |i| question(model, passing, candidate(candidates, i), x0, x1));
+    let open = screening::approaching(x0, x1, &primitives(model), candidates, &half_thicknesses(model, 1.0), par);
+    let found =
+        par.map_indexed(open.len(), |i| question(model, passing, candidate(candidates, open[i] as usize), x0, x1));
     let questions: Vec<Question> = found.into_iter().flatten().collect();
     let mut hits = mesh_hits(model, &questions, x0, x1, par);
     hits.extend(half_space_pairs(model, filter).filter_map(|pair| half_space_hit(model, passing, pair, start, end)));
@@ -73,24 +74,17 @@ struct Question {
     separation: f64,
 }
 
-/// What to ask continuous detection about a pair; `None` where its distance and its motion answer already.
+/// What to ask continuous detection about a pair; `None` for one that may pass or that stands still.
 fn question(model: &Model, passing: &Passing, pair: Pair, x0: &[Vec3], x1: &[Vec3]) -> Option<Question> {
     let vertices = pair.vertices(model);
     if passing.touches(&vertices) {
         return None;
     }
-    let (p0, p1) = (gather(vertices, x0), gather(vertices, x1));
-    if p0 == p1 {
+    let p0 = gather(vertices, x0);
+    if p0 == gather(vertices, x1) {
         return None;
     }
-    let approach = relative_motion(pair.kind, &p0, &p1);
     let distance = pair.closest_points(&p0).distance_squared.sqrt();
-    let [a, b] = pair.bodies(model);
-    let widest = minimum_separation(model.bodies[a].half_thickness + model.bodies[b].half_thickness, distance);
-    // Margins of rounding: the quick answer must not outrun the certified one.
-    if (1.0 - 1e-9) * distance - distance_rounding(&p0) > widest + (1.0 + 1e-9) * approach {
-        return None;
-    }
     let thickness = pair.thickness(model)?;
     Some(Question { pair, thickness, separation: minimum_separation(thickness, distance) })
 }
@@ -120,27 +114,6 @@ fn mesh_hits(model: &Model, questions: &[Question], x0: &[Vec3], x1: &[Vec3], pa
         Some(Hit { pair: *pair, time: found.time, contact })
     });
     hit.collect()
-}
-
-/// The largest relative displacement of a vertex of one primitive against one of the other, and what rounding may hide
-/// of it: no distance within the pair shrinks by more.
-#[inline]
-fn relative_motion(kind: PairKind, x0: &[Vec3; 4], x1: &[Vec3; 4]) -> f64 {
-    let d: [Vec3; 4] = [sub(x1[0], x0[0]), sub(x1[1], x0[1]), sub(x1[2], x0[2]), sub(x1[3], x0[3])];
-    let between = |i: usize, j: usize| norm_squared(sub(d[i], d[j]));
-    let squared = match kind {
-        PairKind::EdgeEdge => between(0, 2).max(between(0, 3)).max(between(1, 2)).max(between(1, 3)),
-        _ => between(0, 1).max(between(0, 2)).max(between(0, 3)),
-    };
-    let farthest = d.iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
-    squared.sqrt() + 8.0 * f64::EPSILON * farthest
-}
-
-/// What rounding may add to the distance of a pair: closest points are good to 16 roundings of the pair's extent.
-#[inline]
-fn distance_rounding(x: &[Vec3; 4]) -> f64 {
-    let extent = x[1..].iter().flat_map(|p| sub(*p, x[0])).fold(0.0_f64, |m, c| m.max(c.abs()));
-    32.0 * f64::EPSILON * extent
 }
 
 fn half_space_hit(model: &Model, passing: &Passing, pair: Pair, start: &State, end: &State) -> Option<Hit> {

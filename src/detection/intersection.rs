@@ -11,8 +11,16 @@ use super::primitives::{Candidates, Filter, Primitives};
 use super::{BroadPhase, Motion, brute_force};
 use crate::geometry::{edge_edge, point_triangle};
 use crate::math::predicates::{plane_side, segment_meets_triangle};
+use crate::math::simd::points::{self, Point, gather, largest};
+use crate::math::simd::{Kernel, Lanes, run_wide};
 use crate::math::{Vec3, add_scaled, cross, dot, lerp, sub};
 use crate::parallel::Par;
+
+/// Pairs per task.
+const TASK: usize = 4096;
+
+/// Pairs side by side.
+const WIDTH: usize = 4;
 
 /// An edge and a face that share a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,21 +55,93 @@ pub fn find_with(
     among(primitives, &candidates.edge_face, x, par)
 }
 
-/// [`find`] over all pairs: its oracle. Cost: quadratic.
+/// [`find`] over all pairs, each decided exactly without a filter: its oracle. Cost: quadratic.
 pub fn find_brute_force(primitives: &Primitives, x: &[Vec3], filter: &Filter) -> Vec<Intersection> {
     let motion = Motion { x0: x, x1: x, radius: &[] };
     let candidates = brute_force::edge_face_candidates(primitives, &motion, filter);
-    among(primitives, &candidates.edge_face, x, Par::Serial)
+    let decide = |pair: &[u32; 2]| intersection(*pair, &vertices(primitives, *pair).map(|v| x[v]));
+    candidates.edge_face.iter().filter_map(decide).collect()
 }
 
-fn among(primitives: &Primitives, pairs: &[[u32; 2]], x: &[Vec3], par: Par) -> Vec<Intersection> {
-    let test = |i: usize| {
-        let [edge, face] = pairs[i];
-        let [p, q] = primitives.edges[edge as usize].map(|v| x[v as usize]);
-        let [a, b, c] = primitives.faces[face as usize].map(|v| x[v as usize]);
-        segment_meets_triangle(p, q, a, b, c).then(|| Intersection { edge, face, point: common_point(p, q, a, b, c) })
-    };
-    par.map_indexed(pairs.len(), test).into_iter().flatten().collect()
+/// Those of the edge-face pairs that share a point at `x`, in their order. Exact; cost: linear.
+pub fn among(primitives: &Primitives, pairs: &[[u32; 2]], x: &[Vec3], par: Par) -> Vec<Intersection> {
+    let mut tasks: Vec<(&[[u32; 2]], Vec<Intersection>)> = pairs.chunks(TASK).map(|p| (p, Vec::new())).collect();
+    par.for_each_task(&mut tasks, |(pairs, found)| run_wide(Task { primitives, pairs, x, found }));
+    tasks.into_iter().flat_map(|(_, found)| found).collect()
+}
+
+/// Some of the edge-face pairs.
+struct Task<'a> {
+    primitives: &'a Primitives<'a>,
+    pairs: &'a [[u32; 2]],
+    x: &'a [Vec3],
+    found: &'a mut Vec<Intersection>,
+}
+
+impl Kernel for Task<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for chunk in self.pairs.chunks(WIDTH) {
+            // Lanes beyond the last pair repeat the first one.
+            let mut corners = [vertices(self.primitives, chunk[0]); WIDTH];
+            for (v, pair) in corners.iter_mut().zip(chunk) {
+                *v = vertices(self.primitives, *pair);
+            }
+            let margin = margin(&gather(self.x, &corners));
+            for (l, pair) in chunk.iter().enumerate() {
+                let apart = margin.0[l] > 0.0;
+                if !apart {
+                    self.found.extend(intersection(*pair, &corners[l].map(|v| self.x[v])));
+                }
+            }
+        }
+    }
+}
+
+/// `p q a b c` of an edge and a face.
+#[inline(always)]
+fn vertices(primitives: &Primitives, [edge, face]: [u32; 2]) -> [usize; 5] {
+    let ([p, q], [a, b, c]) = (primitives.edges[edge as usize], primitives.faces[face as usize]);
+    [p, q, a, b, c].map(|v| v as usize)
+}
+
+/// The exact decision on one pair.
+#[inline(never)]
+fn intersection([edge, face]: [u32; 2], [p, q, a, b, c]: &[Vec3; 5]) -> Option<Intersection> {
+    let (p, q, a, b, c) = (*p, *q, *a, *b, *c);
+    segment_meets_triangle(p, q, a, b, c).then(|| Intersection { edge, face, point: common_point(p, q, a, b, c) })
+}
+
+/// Greater than zero where a direction certainly separates the segment `p q` from the triangle `a b c`: the normal of
+/// the triangle's plane, and in that plane those of the triangle's edges and of the segment.
+#[inline(always)]
+fn margin<const L: usize>([p, q, a, b, c]: &[Point<L>; 5]) -> Lanes<L> {
+    let all = [points::sub(p, a), points::sub(q, a), points::sub(b, a), points::sub(c, a)];
+    let [p, q, b, c] = &all;
+    let extent = largest(p).max(largest(q)).max(largest(b).max(largest(c)));
+    let normal = points::cross(b, c);
+    let mut best = separation(&normal, &all, extent);
+    for along in [*b, *c, points::sub(c, b), points::sub(q, p)] {
+        best = best.max(separation(&points::cross(&normal, &along), &all, extent));
+    }
+    best
+}
+
+/// Greater than zero where the direction n, whatever it is, certainly has the segment's ends `p q` on one side of the
+/// triangle's corners: 0, b and c.
+///
+/// With u the unit roundoff and M the extent, each `n·x` is off by less than `5 u |n|_1 M`, of which two are compared.
+#[inline(always)]
+fn separation<const L: usize>(n: &Point<L>, [p, q, b, c]: &[Point<L>; 4], extent: Lanes<L>) -> Lanes<L> {
+    let (zero, size) = (Lanes::splat(0.0), (n[0].abs() + n[1].abs() + n[2].abs()) * extent);
+    let (np, nq, nb, nc) = (points::dot(n, p), points::dot(n, q), points::dot(n, b), points::dot(n, c));
+    let above = np.min(nq) - zero.max(nb).max(nc);
+    let below = zero.min(nb).min(nc) - np.max(nq);
+    // Sizes whose products leave the range of doubles decide nothing.
+    let in_range = (size - Lanes::splat(1e-250)).min(Lanes::splat(1e250) - size);
+    (above.max(below) - size * Lanes::splat(8.0 * f64::EPSILON)).min(in_range)
 }
 
 /// A point of the segment that is nearest to the triangle they meet in, to rounding.

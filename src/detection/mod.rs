@@ -4,6 +4,7 @@
 //! * `brute_force`: every pair tested; the oracle of the other structures
 //! * `ownership`, `bvh`, `leaf_blocks`, `leaf_pairs`, `pair_lists`, `broad_phase`: the same candidates by a tree of boxes
 //! * `proximity`: near pairs at a state, with weights, normals and distances
+//! * `screening`: candidates that a separating direction rules out, several at once
 //! * `intersection`: the certificate, edges against faces by exact predicates
 //! * `ccd`: continuous detection of one pair
 
@@ -18,6 +19,7 @@ mod ownership;
 mod pair_lists;
 mod primitives;
 pub mod proximity;
+pub mod screening;
 
 pub use broad_phase::BroadPhase;
 pub use primitives::{Candidates, Filter, Motion, Primitives};

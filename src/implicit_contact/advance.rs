@@ -6,7 +6,7 @@ use super::fall_back::{FallBack, fall_back, witnesses};
 use super::manifold_refinement::{Surroundings, lap, refine};
 use super::memory::Certified;
 use super::{Memory, SolverScratch};
-use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing, intersections};
+use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing, intersections_with};
 use crate::fail_safe::parts_of_step;
 use crate::math::{Vec3, is_finite};
 use crate::model::{
@@ -58,13 +58,13 @@ pub fn advance(
     let mut account = StepAccount::new(model, state, &driven.drives);
     account.report.times.dynamics += lap(&mut clock);
     // (3) The start state: certified, refused, or tangled.
-    let mut passing = start_state(model, &filter, state, memory, settings, &mut account.report, par)?;
+    let mut passing = start_state(model, &filter, state, memory, settings, &mut account.report, scratch, par)?;
     account.report.times.certificate += lap(&mut clock);
     // (4) to (7), part by part.
     let around = Surroundings { metric: &driven.metric, filter: &filter, settings, par };
     let pinch = run_parts(&around, &undivided, &driven, memory, &mut passing, scratch, &mut account)?;
     // (8) Commit and report.
-    commit((&filter, settings, par), model, state, memory, dt, result, &passing, &mut account);
+    commit((&filter, settings, par), model, state, memory, dt, result, &passing, scratch, &mut account);
     let mut report = account.finished_report();
     report.bytes = (memory.bytes() + scratch.candidates.bytes()) as u64;
     report.times.total = lap(&mut whole);
@@ -166,6 +166,7 @@ fn commit(
     dt: f64,
     result: &mut StepResult,
     passing: &Passing,
+    scratch: &mut Scratch,
     account: &mut StepAccount,
 ) {
     let mut clock = Instant::now();
@@ -182,7 +183,8 @@ fn commit(
         half_spaces: state.half_spaces.clone(),
     });
     if settings.certify {
-        let found = intersections(model, filter, state, par).witnesses.len();
+        let search = &mut scratch.candidates;
+        let found = intersections_with(search, model, filter, state, par).witnesses.len();
         account.report.intersections = Some(found as u32);
         if found > 0 {
             memory.certified = None;
@@ -199,12 +201,13 @@ fn start_state(
     memory: &Memory,
     settings: &Settings,
     report: &mut StepReport,
+    scratch: &mut Scratch,
     par: Par,
 ) -> Result<Passing, StepError> {
     if memory.knows(model, filter, state) {
         return Ok(Passing::default());
     }
-    let tangle = intersections(model, filter, state, par);
+    let tangle = intersections_with(&mut scratch.candidates, model, filter, state, par);
     if !tangle.witnesses.is_empty() && settings.start_policy == StartPolicy::Refuse {
         return Err(StepError::IntersectingStart(tangle.witnesses));
     }

@@ -14,6 +14,7 @@ mod intersection;
 mod problem_files;
 mod proximity;
 mod scenes;
+mod screening;
 mod solver;
 mod solver_problems;
 mod solver_traps;

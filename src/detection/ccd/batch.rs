@@ -9,7 +9,7 @@ use super::motion::{EdgeEdge, Kind, VertexFace};
 use super::roots::only_root;
 use super::{filter, separation};
 use crate::detection::{Candidates, Primitives};
-use crate::math::simd::{Kernel, Lanes, run_wide};
+use crate::math::simd::{Kernel, Lanes, points, run_wide};
 use crate::math::{Vec3, is_finite};
 use crate::parallel::Par;
 
@@ -239,26 +239,8 @@ impl List<'_> {
         for l in 0..L {
             v[l] = self.vertices(shape, pairs[l]);
         }
-        (transposed(self.step.x0, &v), transposed(self.step.x1, &v))
+        (points::gather(self.step.x0, &v), points::gather(self.step.x1, &v))
     }
-}
-
-/// The four points of several pairs, coordinate by coordinate.
-#[inline(always)]
-fn transposed<const L: usize>(x: &[Vec3], v: &[[usize; 4]; L]) -> [Point<L>; 4] {
-    let mut points = [[Lanes([0.0; L]); 3]; 4];
-    for k in 0..4 {
-        let mut p = [[0.0; 3]; L];
-        for l in 0..L {
-            p[l] = x[v[l][k]];
-        }
-        for c in 0..3 {
-            for l in 0..L {
-                points[k][c].0[l] = p[l][c];
-            }
-        }
-    }
-    points
 }
 
 /// Rules out pairs, several at once; what is left is listed in `open`, relative to `start`.

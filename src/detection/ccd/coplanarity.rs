@@ -6,6 +6,8 @@
 
 use super::exact::Shape;
 use crate::math::simd::Lanes;
+pub(super) use crate::math::simd::points::{Point, cross};
+use crate::math::simd::points::{add, dot, largest as largest_at, sub};
 
 /// Rounding error of a Bernstein coefficient, and of the cubic evaluated from them anywhere in [0, 1], relative to the
 /// product of the largest components of e, f and g.
@@ -16,33 +18,9 @@ use crate::math::simd::Lanes;
 /// the bound itself and of what is subtracted from the coefficients.
 pub(super) const CUBIC_ERROR: f64 = 144.0 * super::motion::UNIT_ROUNDOFF;
 
-/// Three coordinates, each for several pairs.
-pub(super) type Point<const L: usize> = [Lanes<L>; 3];
-
-#[inline(always)]
-fn sub<const L: usize>(a: &Point<L>, b: &Point<L>) -> Point<L> {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn add<const L: usize>(a: &Point<L>, b: &Point<L>) -> Point<L> {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-#[inline(always)]
-fn dot<const L: usize>(a: &Point<L>, b: &Point<L>) -> Lanes<L> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-pub(super) fn cross<const L: usize>(a: &Point<L>, b: &Point<L>) -> Point<L> {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 #[inline(always)]
 fn largest<const L: usize>([a, b]: &[Point<L>; 2]) -> Lanes<L> {
-    let at_start = a[0].abs().max(a[1].abs()).max(a[2].abs());
-    at_start.max(b[0].abs().max(b[1].abs()).max(b[2].abs()))
+    largest_at(a).max(largest_at(b))
 }
 
 /// From point j to point i at both ends.

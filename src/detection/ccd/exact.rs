@@ -22,7 +22,7 @@ type Quadratic = [Integer; 3];
 
 /// Which closed primitives the four points form.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Shape {
+pub(in crate::detection) enum Shape {
     VertexFace,
     EdgeEdge,
 }

@@ -19,4 +19,7 @@ pub mod point_triangle;
 mod roots;
 pub mod separation;
 
+pub(super) use exact::Shape;
+pub(super) use motion::DIRECTION_ERROR;
+
 pub use batch::{Hit, Pair, Separation, earliest_time_of_impact, hits};

@@ -16,7 +16,7 @@ pub(super) const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
 /// With u the unit roundoff: the difference u M, its interpolation 3 u M, the three-term dot product 3 u on top: below
 /// 8 u per component, times `|n|_1 <= sqrt(3) |n|`; doubled for the sums of two such terms and for the rounding of the
 /// threshold itself.
-pub(super) const DIRECTION_ERROR: f64 = 32.0 * UNIT_ROUNDOFF;
+pub(in crate::detection) const DIRECTION_ERROR: f64 = 32.0 * UNIT_ROUNDOFF;
 
 /// A separating direction at one time.
 #[derive(Clone, Copy, Debug)]

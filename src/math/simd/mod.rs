@@ -3,9 +3,11 @@
 //! * `eight`: eight boxes against one, one bit a lane, and pairs from such bits
 //! * `quad`: three-vectors in f32
 //! * `lanes`: a few doubles side by side, and kernels compiled once more for wide instructions
+//! * `points`: three-vectors of such doubles
 
 mod eight;
 mod lanes;
+pub mod points;
 mod quad;
 pub use eight::{Eight, EightKernel, run_eight};
 pub use lanes::{Kernel, Lanes, run_wide};
