@@ -196,14 +196,17 @@ fn by_rows(rows: usize, entries: Vec<(u32, u32, Mat3)>) -> BlockMatrix {
 
 fn check_symmetry(matrix: &BlockMatrix) -> Result<(), StepError> {
     let scale_of = |row: usize| largest(&matrix.values[matrix.diagonal[row]]);
+    // In each row, the first entry whose column has not been passed: rows come in ascending order.
+    let mut next = matrix.row_offsets.clone();
     for row in 0..matrix.rows() {
         for k in matrix.row_offsets[row]..matrix.row_offsets[row + 1] {
             let column = matrix.columns[k] as usize;
-            let across = matrix.row_offsets[column]..matrix.row_offsets[column + 1];
-            let mirrored = match matrix.columns[across.clone()].binary_search(&(row as u32)) {
-                Ok(i) => transpose(&matrix.values[across.start + i]),
-                Err(_) => ZERO_MATRIX,
-            };
+            let (slot, end) = (&mut next[column], matrix.row_offsets[column + 1]);
+            while *slot < end && (matrix.columns[*slot] as usize) < row {
+                *slot += 1;
+            }
+            let present = *slot < end && matrix.columns[*slot] as usize == row;
+            let mirrored = if present { transpose(&matrix.values[*slot]) } else { ZERO_MATRIX };
             let difference = largest(&crate::math::mat_add(&matrix.values[k], &mat_scale(-1.0, &mirrored)));
             if difference > ASYMMETRY * scale_of(row).max(scale_of(column)) {
                 let message = "host matrix is not symmetric";

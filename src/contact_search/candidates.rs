@@ -1,8 +1,9 @@
-//! Candidate pairs of a segment, kept while the tentative end positions stay near those they were found for.
+//! Candidate pairs of a segment, kept over rounds and steps while every vertex stays in the box they were found for.
 
 use super::pair::BodyFilter;
 use crate::detection::{BroadPhase, Candidates, Primitives};
-use crate::math::{Vec3, sub};
+use crate::geometry::Aabb;
+use crate::math::{Vec3, is_finite};
 use crate::model::Model;
 use crate::parallel::Par;
 
@@ -21,17 +22,21 @@ pub struct CandidateSearch {
 struct Anchor {
     topology: u64,
     filter: u64,
-    x0: Vec<Vec3>,
-    x1: Vec<Vec3>,
     factor: f64,
+    /// The boxes searched, by vertex.
+    boxes: Vec<Aabb>,
 }
 
+/// Continuous detection keeps half the thickness at most, and may raise an alarm a thousandth farther away: boxes that
+/// are thickened by this many half thicknesses hold all it can find.
+const SWEPT_REACH: f64 = 0.51;
+
 impl CandidateSearch {
-    /// Vertex-face and edge-edge pairs whose boxes, swept from `x0` to `x1` and thickened by `factor` times the half
-    /// thicknesses, overlap; a superset of them when kept from an earlier call.
+    /// All vertex-face and edge-edge pairs closer at `x0` than `factor` times their thickness along every axis, or closer
+    /// than half their thickness on the way to `x1`; a superset of them, which depends on earlier calls.
     ///
-    /// Boxes are thickened by one half thickness more. Continuous detection needs half of one, so that candidates are
-    /// kept while no end position moves by more than `factor + 1/2` half thicknesses along an axis.
+    /// Boxes are swept from `x0` to `x1` and thickened by `factor + 1` half thicknesses. The pairs are kept over rounds
+    /// and steps as long as each vertex stays within its box: at `x0` with `factor`, on its way with half of one to spare.
     pub fn update(
         &mut self,
         model: &Model,
@@ -48,13 +53,10 @@ impl CandidateSearch {
         let broad_phase = tree(&mut self.broad_phase, model);
         broad_phase.refit(x0, x1, &radius, par);
         broad_phase.candidates(&|a, b| allowed(model, filter, a, b), &mut self.candidates, par);
-        self.anchor = Some(Anchor {
-            topology: model.topology_hash,
-            filter: filter.fingerprint(),
-            x0: x0.to_vec(),
-            x1: x1.to_vec(),
-            factor,
-        });
+        let mut boxes = self.anchor.take().map(|anchor| anchor.boxes).unwrap_or_default();
+        boxes.clear();
+        boxes.extend_from_slice(broad_phase.boxes());
+        self.anchor = Some(Anchor { topology: model.topology_hash, filter: filter.fingerprint(), factor, boxes });
         &self.candidates
     }
 
@@ -70,7 +72,7 @@ impl CandidateSearch {
     pub fn bytes(&self) -> usize {
         let c = &self.candidates;
         8 * (c.vertex_face.capacity() + c.edge_edge.capacity() + self.certificate.edge_face.capacity())
-            + self.anchor.as_ref().map_or(0, |a| 24 * (a.x0.capacity() + a.x1.capacity()))
+            + self.anchor.as_ref().map_or(0, |a| 48 * a.boxes.capacity())
     }
 }
 
@@ -88,16 +90,18 @@ fn allowed(model: &Model, filter: &BodyFilter, a: u32, b: u32) -> bool {
 
 impl Anchor {
     fn holds(&self, model: &Model, filter: &BodyFilter, x0: &[Vec3], x1: &[Vec3], factor: f64) -> bool {
-        let near = |(i, (a, b)): (usize, (&Vec3, &Vec3))| {
-            let margin = (factor + 0.5) * model.bodies[model.vertex_body[i] as usize].half_thickness;
-            sub(*a, *b).iter().all(|d| d.abs() <= margin)
+        let within = |(v, searched): (usize, &Aabb)| {
+            let half_thickness = model.bodies[model.vertex_body[v] as usize].half_thickness;
+            let near = Aabb::swept(x0[v], x0[v], factor * half_thickness);
+            let way = Aabb::swept(x0[v], x1[v], SWEPT_REACH * half_thickness);
+            // The box of a number that is none would be that of the other end.
+            is_finite(x0[v]) && is_finite(x1[v]) && searched.contains(&near.union(&way))
         };
         self.topology == model.topology_hash
             && self.filter == filter.fingerprint()
             && self.factor == factor
-            && self.x0 == x0
-            && self.x1.len() == x1.len()
-            && self.x1.iter().zip(x1).enumerate().all(near)
+            && self.boxes.len() == x0.len()
+            && self.boxes.iter().enumerate().all(within)
     }
 }
 

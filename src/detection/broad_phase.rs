@@ -102,6 +102,11 @@ impl BroadPhase {
         self.refit(x0, x1, radius, par);
     }
 
+    /// The boxes of the vertices in the last motion, by vertex index.
+    pub fn boxes(&self) -> &[Aabb] {
+        &self.boxes
+    }
+
     /// Orders the elements anew by their boxes.
     fn arrange(&mut self) {
         let (edges, faces, packed, owned) = (&self.edges, &self.faces, &self.packed, &self.ownership);

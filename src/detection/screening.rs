@@ -92,26 +92,53 @@ impl Screen<'_> {
             reach.0[l] = self.reach[v[l][0]] + self.reach[v[l][second]];
         }
         let d0 = differences(shape, &gather(self.x0, &v));
-        let mut extent = sizes(&d0);
         let (n, distance) = direction(shape, &d0);
-        let gap = support(&n, &d0);
-        let (gap, required) = match self.x1 {
-            None => (gap, reach * Lanes::splat(1.0 + SLACK) + extent * Lanes::splat(16.0 * DIRECTION_ERROR)),
+        match self.x1 {
+            None => {
+                let error = sizes(&d0) * Lanes::splat(16.0 * DIRECTION_ERROR);
+                certain(support(&n, &d0), reach * Lanes::splat(1.0 + SLACK) + error, sizes(&d0))
+            }
             Some(x1) => {
                 let d1 = differences(shape, &gather(x1, &v));
-                extent = extent + sizes(&d1);
-                let error = extent * Lanes::splat(DIRECTION_ERROR);
-                let distance = distance * Lanes::splat(1.0 + SLACK) + error + error;
+                let extent = sizes(&d0) + sizes(&d1);
+                let rounding = Lanes::splat(2.0 * DIRECTION_ERROR) * extent;
+                let distance = distance * Lanes::splat(1.0 + SLACK) + rounding;
                 let separation = Lanes::splat(0.5) * reach.min(distance);
-                (gap.min(support(&n, &d1)), separation * Lanes::splat(1.0 + 4.0 * f64::EPSILON) + error)
+                certain(support(&n, &d0).min(support(&n, &d1)), required(separation, extent), extent)
             }
-        };
-        // Sizes whose squares leave the range of doubles decide nothing, nor do directions that are not finite: no gap
-        // of a unit vector is longer than its pair.
-        let in_range = (extent - Lanes::splat(1e-60)).min(Lanes::splat(1e60) - extent);
-        // NaN last: the smaller of two is the second where one is not a number.
-        in_range.min(Lanes::splat(4.0) * extent - gap).min(gap - required)
+        }
     }
+}
+
+/// Greater than zero where the direction between the closest points at one end of the step, `at_end` or the start,
+/// keeps the pair apart by more than `separation` on the whole step.
+#[inline(always)]
+pub(super) fn separation_margin<const L: usize>(
+    shape: Shape,
+    x0: &[Point<L>; 4],
+    x1: &[Point<L>; 4],
+    separation: Lanes<L>,
+    at_end: bool,
+) -> Lanes<L> {
+    let (d0, d1) = (differences(shape, x0), differences(shape, x1));
+    let (n, _) = direction(shape, if at_end { &d1 } else { &d0 });
+    let extent = sizes(&d0) + sizes(&d1);
+    certain(support(&n, &d0).min(support(&n, &d1)), required(separation, extent), extent)
+}
+
+/// What a computed `n·D` must reach to prove `separation`.
+#[inline(always)]
+fn required<const L: usize>(separation: Lanes<L>, extent: Lanes<L>) -> Lanes<L> {
+    separation * Lanes::splat(1.0 + 4.0 * f64::EPSILON) + extent * Lanes::splat(DIRECTION_ERROR)
+}
+
+/// `gap - required` where the pair's sizes can be trusted: squares within the range of doubles, and no gap of a unit
+/// vector longer than the pair.
+#[inline(always)]
+fn certain<const L: usize>(gap: Lanes<L>, required: Lanes<L>, extent: Lanes<L>) -> Lanes<L> {
+    let in_range = (extent - Lanes::splat(1e-60)).min(Lanes::splat(1e60) - extent);
+    // NaN last: the smaller of two is the second where one is not a number.
+    in_range.min(Lanes::splat(4.0) * extent - gap).min(gap - required)
 }
 
 /// Candidates of one block; the numbers of those left open go to the front of `out`.

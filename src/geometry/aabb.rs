@@ -43,6 +43,12 @@ impl Aabb {
         out
     }
 
+    /// Whether the other box lies within this one; not where a coordinate is not a number.
+    #[inline]
+    pub fn contains(&self, other: &Aabb) -> bool {
+        (0..3).all(|k| self.low[k] <= other.low[k] && other.high[k] <= self.high[k])
+    }
+
     /// Whether the closed boxes share a point.
     #[inline]
     pub fn overlaps(&self, other: &Aabb) -> bool {

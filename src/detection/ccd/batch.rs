@@ -8,6 +8,7 @@ use super::exact::Shape;
 use super::motion::{EdgeEdge, Kind, VertexFace};
 use super::roots::only_root;
 use super::{filter, separation};
+use crate::detection::screening::separation_margin;
 use crate::detection::{Candidates, Primitives};
 use crate::math::simd::{Kernel, Lanes, points, run_wide};
 use crate::math::{Vec3, is_finite};
@@ -194,7 +195,12 @@ impl List<'_> {
         if self.finite {
             let filter = BlockFilter { list: self, shape: K::SHAPE, start, count, t_max, separated, open: &mut open };
             filled = run_wide(filter);
-            if !separated {
+            if separated {
+                for at_end in [false, true] {
+                    let open = &mut open[..filled];
+                    filled = run_wide(BlockDirections { list: self, shape: K::SHAPE, start, at_end, open });
+                }
+            } else {
                 let open = &open[..filled];
                 run_wide(BlockRoots { list: self, shape: K::SHAPE, start, t_max, open, times: &mut times });
             }
@@ -280,15 +286,62 @@ impl BlockFilter<'_> {
                 s.0[l] = self.list.separation(pairs[l]);
             }
             let (x0, x1) = self.list.gather(shape, &pairs);
-            let frame = Frame::new(shape, &x0, &x1);
-            let gap = if self.separated {
-                axis_gap(shape, &x0, &x1, s, self.t_max).max(plane_gap(&frame, Some(s), self.t_max))
-            } else {
-                axis_gap(shape, &x0, &x1, s, self.t_max).max(plane_gap(&frame, None, self.t_max))
-            };
+            let mut gap = axis_gap(shape, &x0, &x1, s, self.t_max);
+            if !self.separated {
+                gap = gap.max(plane_gap(&Frame::new(shape, &x0, &x1), self.t_max));
+            }
             for l in 0..width {
                 self.open[filled] = (group + l) as u16;
                 filled += 1 - usize::from(gap.0[l] > 0.0);
+            }
+        }
+        filled
+    }
+}
+
+/// Rules out pairs that a fixed direction keeps apart by their separation; what is left stays in `open`.
+struct BlockDirections<'a> {
+    list: &'a List<'a>,
+    shape: Shape,
+    start: usize,
+    at_end: bool,
+    open: &'a mut [u16],
+}
+
+impl Kernel for BlockDirections<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run(self) -> usize {
+        match self.shape {
+            Shape::VertexFace => self.run_shape(Shape::VertexFace),
+            Shape::EdgeEdge => self.run_shape(Shape::EdgeEdge),
+        }
+    }
+}
+
+impl BlockDirections<'_> {
+    #[inline(always)]
+    fn run_shape(self, shape: Shape) -> usize {
+        let mut filled = 0;
+        for group in (0..self.open.len()).step_by(WIDTH) {
+            let width = WIDTH.min(self.open.len() - group);
+            // Lanes beyond the last pair repeat it.
+            let mut numbers = [0; WIDTH];
+            let mut pairs = [0; WIDTH];
+            let mut s = Lanes([0.0; WIDTH]);
+            for l in 0..WIDTH {
+                numbers[l] = self.open[group + l.min(width - 1)];
+                pairs[l] = self.start + numbers[l] as usize;
+                s.0[l] = self.list.separation(pairs[l]);
+            }
+            let (x0, x1) = self.list.gather(shape, &pairs);
+            let margin = separation_margin(shape, &x0, &x1, s, self.at_end);
+            for l in 0..width {
+                // What is not a number stays open.
+                let apart = margin.0[l] > 0.0;
+                self.open[filled] = numbers[l];
+                filled += 1 - usize::from(apart);
             }
         }
         filled

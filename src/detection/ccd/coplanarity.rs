@@ -122,32 +122,16 @@ fn least_gap<const L: usize>(gap0: Lanes<L>, gap1: Lanes<L>, t_max: f64) -> Lane
     gap0.min(s * gap0 + t * gap1 - rounding)
 }
 
-/// Greater than zero where the plane keeps the pair apart by more than `separation` on `[0, t_max]`: the cubic's
-/// coefficients exceed those of `separation |e x f|`, bounded by the norms of its control vectors, by the rounding
-/// error.
+/// Greater than zero where the four points are certainly not coplanar on `[0, t_max]`: the cubic's coefficients exceed
+/// the rounding error and have one sign.
 #[inline(always)]
-pub(super) fn plane_gap<const L: usize>(frame: &Frame<L>, separation: Option<Lanes<L>>, t_max: f64) -> Lanes<L> {
-    let n = frame.normals();
-    let mut above = frame.cubic_times_three(&n);
-    let mut below = [above[0].negate(), above[1].negate(), above[2].negate(), above[3].negate()];
+pub(super) fn plane_gap<const L: usize>(frame: &Frame<L>, t_max: f64) -> Lanes<L> {
+    let mut above = frame.cubic_times_three(&frame.normals());
     let [me, mf, mg] = frame.sizes();
-    if let Some(separation) = separation {
-        // The computed vectors are off by 18 u (36 u the middle one) of the product of sizes, their norms and the sums
-        // below by less than 100 u more, their interpolation by 91 u.
-        let size = |v: &Point<L>| dot(v, v).sqrt();
-        let (n0, n1, n2) = (size(&n[0]), size(&n[1]), size(&n[2]));
-        let slack = Lanes::splat(2.0 * CUBIC_ERROR) * me * mf;
-        let three = Lanes::splat(3.0);
-        for (i, n) in [three * n0, n0 + n1, n1 + n2, three * n2].into_iter().enumerate() {
-            let required = separation * (n + slack);
-            above[i] = above[i] - required;
-            below[i] = below[i] - required;
-        }
-    }
     if t_max < 1.0 {
         above = up_to(&above, t_max);
-        below = up_to(&below, t_max);
     }
+    let below = [above[0].negate(), above[1].negate(), above[2].negate(), above[3].negate()];
     let product = me * mf * mg;
     let gap = least(&above).max(least(&below)) - Lanes::splat(3.0 * CUBIC_ERROR) * product;
     // Sizes whose products leave the range of doubles decide nothing.

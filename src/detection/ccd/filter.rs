@@ -46,7 +46,7 @@ pub(super) fn time_of_impact<const N: usize, K: Kind<N>>(x0: &[Vec3; 4], x1: &[V
         return None;
     }
     let frame = Frame::new(K::SHAPE, &y0, &y1);
-    if plane_gap(&frame, None, 1.0).0[0] > 0.0 {
+    if plane_gap(&frame, 1.0).0[0] > 0.0 {
         return None;
     }
     after_plane_test::<N, K>(x0, x1, &frame, t_max)
