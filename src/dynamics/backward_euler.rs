@@ -104,7 +104,7 @@ impl Task<'_> {
 /// Solves `A v = b` for the nodes that are not `pinned`, from the given `v`, which the pinned keep; steps of conjugate
 /// gradients made, and whether the residual fell to [`TOLERANCE`] of what it was.
 ///
-/// A direct factor where it costs no more than [`DIRECT_STEPS`] steps of conjugate gradients would, and where those do not
+/// A direct factor where it costs no more than 40 steps of conjugate gradients would, and where those do not
 /// get there if its envelope is of moderate size; else conjugate gradients with the inverse diagonal blocks. A matrix
 /// that is not positive definite leaves what was reached.
 pub fn free_velocities(
