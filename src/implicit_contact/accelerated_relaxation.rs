@@ -15,11 +15,14 @@ use super::stop_test::{Ending, Run, Stagnation, StopTest, Verdict};
 const FIRST_SCALE: f64 = 1.9;
 /// Iterations between two measurements, which also renew what single precision adds increments to.
 const MEASURE_EVERY: u32 = 10;
+/// Passes per iteration, raised on stagnation.
+const PASSES: [u32; 7] = [1, 3, 6, 12, 25, 50, 100];
+/// Passes that are made where need be at any price; more only while they relax no more contacts than A has blocks, since
+/// then they cost about as much as the product.
+const PASSES_ALWAYS: u32 = 12;
 /// Iterations without halving the contact residual after which an iteration makes more passes. Where only the dynamics
 /// lag behind, passes would not help.
-const PASSES_STAGNATION: u32 = 50;
-/// Passes per iteration, raised on stagnation.
-const PASSES: [u32; 4] = [1, 3, 6, 12];
+const PASSES_PATIENCE: u32 = 30;
 /// Smallest tolerance for which iterations run in single precision.
 const SINGLE_FROM: f64 = 1e-5;
 /// Residuals above which stagnation ends the run. Below, a slow relaxation is still faster than the augmented Lagrangian,
@@ -35,7 +38,7 @@ pub(super) struct Control {
     pub iterations_max: u32,
     /// Iterations without halving the residuals together after which the run ends as stagnated.
     pub patience: u32,
-    /// Whether iterations make the most passes from the first on.
+    /// Whether iterations make twelve passes from the first on.
     pub thorough: bool,
 }
 
@@ -108,6 +111,35 @@ impl<'a> Momentum<'a> {
     }
 }
 
+/// How many passes an iteration makes: an inexact projection breaks the momentum where rows conflict, and a heavy body
+/// on a light one takes passes in proportion to the masses.
+struct PassSchedule {
+    level: usize,
+    stagnation: Stagnation,
+    /// Blocks of A.
+    blocks: usize,
+}
+
+impl PassSchedule {
+    fn new(blocks: usize, thorough: bool) -> PassSchedule {
+        let most = PASSES.partition_point(|p| *p <= PASSES_ALWAYS) - 1;
+        PassSchedule { level: if thorough { most } else { 0 }, stagnation: Stagnation::new(PASSES_PATIENCE), blocks }
+    }
+
+    fn passes(&self) -> u32 {
+        PASSES[self.level]
+    }
+
+    /// Judges the contact residual at `iteration`; a pass relaxes `contacts`.
+    fn observe(&mut self, residual: f64, iteration: u32, contacts: usize) {
+        let stagnated = self.stagnation.seen(residual, iteration);
+        let Some(next) = PASSES.get(self.level + 1) else { return };
+        if stagnated && (*next <= PASSES_ALWAYS || *next as usize * contacts <= self.blocks) {
+            self.level += 1;
+        }
+    }
+}
+
 /// Iterations in either precision.
 enum Engine<'a, 'b> {
     Single(Box<SingleRelaxation<'a, 'b>>),
@@ -131,14 +163,13 @@ pub(super) fn run(
         double(at, FIRST_SCALE)
     };
     let mut test = StopTest::new();
-    let mut passes_stagnation = Stagnation::new(PASSES_STAGNATION);
+    let mut schedule = PassSchedule::new(task.problem.matrix.values.len(), control.thorough);
     let mut stagnation = Stagnation::new(control.patience);
-    let mut level = if control.thorough { PASSES.len() - 1 } else { 0 };
     let mut now = Iterate::default();
     let mut k = 0;
     while k < control.iterations_max {
         let steps = MEASURE_EVERY.min(control.iterations_max - k);
-        engine.advance(steps, PASSES[level]);
+        engine.advance(steps, schedule.passes());
         k += steps;
         let residuals = engine.measure(&mut now, buffers);
         match test.check(task, &now, &residuals, at, buffers, work) {
@@ -153,11 +184,8 @@ pub(super) fn run(
             }
             Verdict::Continue => {}
         }
-        if residuals.contact() > task.settings.contact_tolerance
-            && passes_stagnation.seen(residuals.contact(), k)
-            && level + 1 < PASSES.len()
-        {
-            level += 1;
+        if residuals.contact() > task.settings.contact_tolerance {
+            schedule.observe(residuals.contact(), k, engine.relaxed());
         }
         let stagnated = stagnation.seen(residuals.merit(), k);
         if stagnated && let Engine::Single(_) = &engine {
@@ -194,6 +222,14 @@ impl Engine<'_, '_> {
         match self {
             Engine::Single(e) => e.renew(now, buffers),
             Engine::Double(e) => e.renew(buffers),
+        }
+    }
+
+    /// Contacts that a pass relaxes.
+    fn relaxed(&self) -> usize {
+        match self {
+            Engine::Single(e) => e.relaxed(),
+            Engine::Double(e) => e.relaxed(),
         }
     }
 

@@ -170,6 +170,11 @@ impl<'a, 'b> DoubleRelaxation<'a, 'b> {
         });
     }
 
+    /// Contacts that most passes relax.
+    pub fn relaxed(&self) -> usize {
+        self.pressing.len()
+    }
+
     /// Scale of the metric reached.
     pub fn metric_scale(&self) -> f64 {
         self.momentum.metric_scale

@@ -193,6 +193,11 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
         self.work
     }
 
+    /// Contacts that a pass relaxes.
+    pub fn relaxed(&self) -> usize {
+        self.contacts.near().len()
+    }
+
     /// Scale of the metric reached.
     pub fn metric_scale(&self) -> f64 {
         self.momentum.metric_scale

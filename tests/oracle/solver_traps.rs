@@ -252,3 +252,41 @@ fn odd_inputs_have_answers() {
     let (_, dv, report) = free.solve(&Settings::default());
     assert!(report.converged && dv == [[0.0; 3]]);
 }
+
+/// A heavy body that presses a light sheet on the ground: contacts need passes in proportion to the ratio of masses.
+#[test]
+fn a_heavy_body_on_a_light_sheet_is_solved_to_the_contact_tolerance() {
+    let n = 30u32;
+    let mut made = Made::new();
+    for _ in 0..n * n {
+        made.block(isotropic(1e-3), [0.0, 0.0, -0.1]);
+    }
+    let linear = made.block(isotropic(1.0), [0.3, 0.0, -3.0]);
+    let angular = made.block(isotropic(0.02), [0.0, 0.5, 0.2]);
+    for y in 0..n {
+        for x in 0..n - 1 {
+            for (a, b) in [(y * n + x, y * n + x + 1), (x * n + y, (x + 1) * n + y)] {
+                for axis in 0..3 {
+                    let mut e = [0.0; 3];
+                    e[axis] = 1.0;
+                    made.element(&[(a, e), (b, [-e[0], -e[1], -e[2]])], 5e-3);
+                }
+            }
+        }
+    }
+    made.finish();
+    for y in 0..n {
+        for x in 0..n {
+            made.contact(&[(y * n + x, 1.0)], &[], [0.0, 0.0, 1.0], (0.0, 0.4));
+            if x.abs_diff(n / 2) < 3 && y.abs_diff(n / 2) < 3 {
+                let lever = [0.05 * (f64::from(x) - 15.0), 0.05 * (f64::from(y) - 15.0), -0.1];
+                let entries = [(linear, 1.0), (y * n + x, -1.0)];
+                made.contact(&entries, &[(angular, lever)], [0.0, 0.0, 1.0], (0.0, 0.4));
+            }
+        }
+    }
+    let (_, reference, _) = made.solve(&tight(SolverChoice::AcceleratedRelaxation));
+    let settings = Settings { iterations_max: 400, ..Settings::default() };
+    let (error, report) = close(&made, &settings, &reference);
+    assert!(report.converged && report.hand_overs == 0 && error < settings.velocity_tolerance, "{error:e} {report:?}");
+}
