@@ -1,12 +1,16 @@
-"""Draws frames (OBJ files as the example hosts write them) as a picture sheet, without a display.
+"""Draws frames (OBJ files as the example hosts and the runner write them) as a picture sheet, without a display.
 
     python ci/pictures.py OUT.png FRAME.obj... [--columns 3] [--size 640x480] [--camera X,Y,Z] [--look-at X,Y,Z]
+    python ci/pictures.py RUN [--count 6] ...
 
-Objects named `cloth*` are drawn as two-sided cloth, objects named `ground` are replaced by a floor at y = 0 (give
---floor), all others as solids. Needs `pip install pyvista`.
+RUN is a folder that `signorini-run --out` wrote: RUN/sheet.png shows some of its frames, evenly spaced, RUN/stats.png
+plots its steps. Objects named `cloth*`, and surfaces that are open, are drawn as two-sided cloth, objects named `ground`
+are replaced by a floor (give --floor; a run knows its own), all others as solids. Needs `pip install pyvista`.
 """
 
 import argparse
+import csv
+import json
 import pathlib
 
 import numpy as np
@@ -43,6 +47,17 @@ def read_obj(path):
     return result
 
 
+def turned(scene):
+    """The frame with z up turned so that y is up."""
+    return [(name, points[:, [0, 2, 1]] * [1.0, 1.0, -1.0], faces) for name, points, faces in scene]
+
+
+def is_open(faces):
+    """Whether some edge belongs to one face only."""
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    return len(edges) > 0 and np.any(np.unique(edges, axis=0, return_counts=True)[1] == 1)
+
+
 def surface(points, faces):
     cells = np.hstack([np.full((len(faces), 1), 3), faces]).astype(np.int64)
     return pv.PolyData(points, cells.ravel())
@@ -76,9 +91,9 @@ def add_shadow(plotter, points, faces, floor, sun):
     plotter.add_mesh(surface(flat, faces), color=SHADOW, lighting=False)
 
 
-def add_grid(plotter, size):
+def add_grid(plotter, size, height):
     """Thin lines on the floor, half a unit apart at the scale of a metre, so that motion can be seen."""
-    step, reach, height = 0.5, 12, -1.2e-3 * size
+    step, reach, height = 0.5, 12, height - 1.2e-3 * size
     for i in range(-2 * reach, 2 * reach + 1):
         for a, b in (((i * step, -reach), (i * step, reach)), ((-reach, i * step), (reach, i * step))):
             line = pv.Line((a[0], height, a[1]), (b[0], height, b[1]))
@@ -100,7 +115,7 @@ def light_scene(plotter, directions, centre, size):
         plotter.add_light(light)
 
 
-def draw(scene, window, camera, look_at, angle, centre, size, floor):
+def draw(scene, window, camera, look_at, angle, centre, size, floor, height):
     """One frame as an array of pixels."""
     plotter = pv.Plotter(off_screen=True, lighting="none", window_size=[2 * side for side in window])
     plotter.set_background(SKY_BOTTOM, top=SKY_TOP)
@@ -110,15 +125,15 @@ def draw(scene, window, camera, look_at, angle, centre, size, floor):
     for name, points, faces in scene:
         if len(faces) == 0:
             continue
-        if name.startswith("cloth"):
+        if name.startswith("cloth") or is_open(faces):
             add_cloth(plotter, points, faces)
         else:
             add_solid(plotter, points, faces, SOLIDS[solids % len(SOLIDS)])
             solids += 1
     if floor:
-        add_grid(plotter, size)
-        # A hair under y = 0, so that what lies on the floor is not drawn into it.
-        ground = -2e-3 * size
+        add_grid(plotter, size, height)
+        # A hair under it, so that what lies on the floor is not drawn into it.
+        ground = height - 2e-3 * size
         disc = pv.Disc(center=(centre[0], ground, centre[2]), inner=0.0, outer=9 * size, normal=(0, 1, 0), c_res=96)
         plotter.add_mesh(disc, color=FLOOR, lighting=False)
         for _, points, faces in scene:
@@ -138,20 +153,8 @@ def vector(text):
     return np.array([float(word) for word in text.split(",")])
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("out")
-    parser.add_argument("frames", nargs="+")
-    parser.add_argument("--columns", type=int, default=3)
-    parser.add_argument("--size", default="640x480", help="of one picture, in pixels")
-    parser.add_argument("--camera", type=vector, help="where the camera stands; default: a three-quarter view of all")
-    parser.add_argument("--look-at", type=vector)
-    parser.add_argument("--zoom", type=float, default=1.0)
-    parser.add_argument("--follow", action="store_true", help="move the camera with the middle of what is drawn")
-    parser.add_argument("--floor", action="store_true", help="draw a floor at y = 0")
-    arguments = parser.parse_args()
-
-    scenes = [read_obj(frame) for frame in arguments.frames]
+def sheet(scenes, out, arguments, height_of_floor):
+    """Draws frames beside and below each other."""
     points = np.concatenate([points for scene in scenes for _, points, _ in scene if len(points)])
     low, high = points.min(axis=0), points.max(axis=0)
     centre, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
@@ -161,17 +164,90 @@ def main():
     width, height = (int(word) for word in arguments.size.split("x"))
     columns = min(arguments.columns, len(scenes))
     rows = -(-len(scenes) // columns)
-    sheet = np.full((rows * height, columns * width, 3), 255, dtype=np.uint8)
+    picture = np.full((rows * height, columns * width, 3), 255, dtype=np.uint8)
     for index, scene in enumerate(scenes):
         shift = np.zeros(3)
         if arguments.follow:
             shift = np.mean([points.mean(axis=0) for _, points, faces in scene if len(faces)], axis=0) - centre
             shift[1] = 0.0
-        image = draw(scene, (width, height), camera + shift, look_at + shift, 30.0 / arguments.zoom, centre, size, arguments.floor)
+        image = draw(scene, (width, height), camera + shift, look_at + shift, 30.0 / arguments.zoom, centre, size, arguments.floor, height_of_floor)
         row, column = divmod(index, columns)
-        sheet[row * height : (row + 1) * height, column * width : (column + 1) * width] = image
-    Image.fromarray(sheet).save(arguments.out, optimize=True)
-    print(f"{arguments.out}: {len(scenes)} frames, {columns * width} x {rows * height} pixels")
+        picture[row * height : (row + 1) * height, column * width : (column + 1) * width] = image
+    Image.fromarray(picture).save(out, optimize=True)
+    print(f"{out}: {len(scenes)} frames, {columns * width} x {rows * height} pixels")
+
+
+def draw_run(run, arguments):
+    """The sheet and the plots of a run's folder."""
+    report = json.loads((run / "report.json").read_text())
+    frames = sorted((run / "frames").glob("frame_*.obj"))
+    if not frames:
+        raise SystemExit(f"{run}: no frames")
+    chosen = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, arguments.count).round().astype(int))]
+    scenes = [read_obj(frame) for frame in chosen]
+    if report["up"] == "z":
+        scenes = [turned(scene) for scene in scenes]
+    arguments.floor = report["floor"] is not None
+    sheet(scenes, run / "sheet.png", arguments, report["floor"] or 0.0)
+    plot(run, report)
+
+
+def plot(run, report):
+    """Contacts, rounds, energies and times over the steps of a run."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    with open(run / "stats.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    column = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+    time = column["time"]
+    figure, axes = plt.subplots(2, 2, figsize=(12, 7), layout="constrained")
+    figure.suptitle(f"{report['scene']}: {report['vertices']} vertices, {report['tets']} tetrahedra, dt {report['dt']} s")
+    (contacts, energies), (times, rounds) = axes
+    contacts.plot(time, column["contacts"], label="contacts")
+    contacts.plot(time, column["active_contacts"], label="with an impulse")
+    contacts.set(title="contacts", xlabel="s")
+    energies.semilogy(time, np.maximum(column["kinetic_energy"], 1e-12), label="kinetic")
+    energies.semilogy(time, np.maximum(column["elastic_energy"], 1e-12), label="elastic")
+    energies.set(title="energy [J]", xlabel="s")
+    bottom = np.zeros(len(time))
+    for stage in ("dynamics", "search", "rows", "solve", "detection", "fail_safe", "certificate"):
+        times.fill_between(time, 1e3 * bottom, 1e3 * (bottom + column[stage]), label=stage, linewidth=0)
+        bottom += column[stage]
+    times.plot(time, 1e3 * column["processor_seconds"], color="black", linewidth=0.7, label="processor")
+    times.set(title="wall time a step, by stage [ms]", xlabel="s")
+    histogram = report["cmr_rounds_histogram"]
+    rounds.bar(list(histogram), list(histogram.values()))
+    rounds.set(title="steps with contact by rounds of refinement", xlabel="rounds")
+    for axis in (contacts, energies, times):
+        axis.legend(fontsize=8)
+    figure.savefig(run / "stats.png", dpi=100)
+    plt.close(figure)
+    print(f"{run / 'stats.png'}: {len(rows)} steps")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=pathlib.Path, help="the picture, or the folder of a run")
+    parser.add_argument("frames", nargs="*")
+    parser.add_argument("--count", type=int, default=6, help="frames of a run to draw")
+    parser.add_argument("--columns", type=int, default=3)
+    parser.add_argument("--size", default="640x480", help="of one picture, in pixels")
+    parser.add_argument("--camera", type=vector, help="where the camera stands; default: a three-quarter view of all")
+    parser.add_argument("--look-at", type=vector)
+    parser.add_argument("--zoom", type=float, default=1.0)
+    parser.add_argument("--follow", action="store_true", help="move the camera with the middle of what is drawn")
+    parser.add_argument("--floor", action="store_true", help="draw a floor at y = 0")
+    arguments = parser.parse_args()
+
+    if arguments.out.is_dir():
+        draw_run(arguments.out, arguments)
+    elif arguments.frames:
+        sheet([read_obj(frame) for frame in arguments.frames], arguments.out, arguments, 0.0)
+    else:
+        parser.error("no frames given, and the first argument is not a folder")
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@
 //! | [`implicit_contact`] | constraint manifold refinement around iterative constraint anticipation |
 //! | [`world`] | bodies by id, the step, queries |
 //! | [`capi`] | the C ABI |
+//! | `scene` | scene files and the runner, with the cargo feature `runner` |
 //!
 //! Units are the host's: lengths `[m]`, time `[s]`, mass `[kg]` stand for whatever consistent set the host uses.
 //! No tolerance is absolute.
@@ -41,4 +42,6 @@ pub mod math;
 pub mod mesh;
 pub mod model;
 pub mod parallel;
+#[cfg(feature = "runner")]
+pub mod scene;
 pub mod world;

@@ -89,7 +89,9 @@ fn every_module_has_a_layer_and_a_line_in_the_crate_map() {
     assert!(modules.len() > 5);
     for module in modules {
         assert!(layers::layer(module).is_some(), "{module} has no layer");
-        assert!(root.contains(&format!("//! | [`{module}`] |")), "{module} is missing in the map of src/lib.rs");
+        // A module behind a feature is not linked: the map is read without it, too.
+        let listed = [format!("//! | [`{module}`] |"), format!("//! | `{module}` |")];
+        assert!(listed.iter().any(|line| root.contains(line)), "{module} is missing in the map of src/lib.rs");
     }
 }
 

@@ -1,0 +1,205 @@
+//! The final line of a run, and the bounds that it broke.
+
+use super::energy::Centre;
+use super::file::{Bounds, Up};
+use super::statistics::{Spread, StepRow};
+use crate::math::{dot, sub, unit};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// What a run came to; one line of JSON.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    pub scene: String,
+    pub title: String,
+    pub method: String,
+    pub version: &'static str,
+    pub vertices: usize,
+    pub tets: usize,
+    pub bodies: usize,
+    /// Steps that the state has behind it.
+    pub steps: u64,
+    /// Steps that the figures are over: fewer when a run was resumed without the rows of its first part.
+    pub steps_counted: u64,
+    pub dt: f64,
+    pub duration: f64,
+    pub contacts_max: u32,
+    pub active_contacts_max: u32,
+    /// Steps with contact by rounds of constraint manifold refinement, those of a divided step per part.
+    pub cmr_rounds_histogram: BTreeMap<u32, u64>,
+    pub rounds_within_three: f64,
+    /// Steps that were divided.
+    pub divisions: u64,
+    /// Steps with rigid zones or held vertices.
+    pub failsafes: u64,
+    /// Steps that ended early.
+    pub pinched: u64,
+    /// Steps in which a solve stopped at its work cap.
+    pub not_converged: u64,
+    /// Certified, over all steps.
+    pub intersections: u64,
+    /// The largest of the three below.
+    pub residual_max: f64,
+    pub complementarity_residual_max: f64,
+    pub friction_residual_max: f64,
+    pub dynamics_residual_max: f64,
+    pub iterations: Spread,
+    pub seconds_per_step: Spread,
+    pub processor_seconds_per_step: Spread,
+    /// Sums over the steps.
+    pub seconds_by_stage: BTreeMap<&'static str, f64>,
+    pub kinetic_energy_end: f64,
+    pub kinetic_energy_end_per_kg: f64,
+    pub elastic_energy_end: f64,
+    pub bytes_max: u64,
+    pub threads: usize,
+    pub jitter: u64,
+    pub up: &'static str,
+    /// Offset of the half-space that faces up, if there is one.
+    pub floor: Option<f64>,
+    pub frames: u64,
+    pub frames_per_second: f64,
+    /// State hash.
+    pub hash: String,
+    /// Whether the run was stopped before its last step.
+    pub interrupted: bool,
+    pub bounds_broken: Vec<String>,
+}
+
+/// What the report needs besides the rows.
+pub struct Facts {
+    pub scene: String,
+    pub title: String,
+    pub method: String,
+    pub vertices: usize,
+    pub tets: usize,
+    pub bodies: usize,
+    pub steps: u64,
+    pub whole: bool,
+    pub dt: f64,
+    /// `[kg]`
+    pub mass: f64,
+    pub threads: usize,
+    pub jitter: u64,
+    pub up: Up,
+    pub floor: Option<f64>,
+    pub frames: u64,
+    pub frames_per_second: f64,
+    pub hash: u64,
+    pub interrupted: bool,
+    /// Of the bodies that bounds name: at the start and at the end.
+    pub centres: Vec<[Centre; 2]>,
+}
+
+impl Report {
+    pub fn new(facts: Facts, rows: &[StepRow], bounds: &Bounds) -> Report {
+        let count = |f: &dyn Fn(&StepRow) -> bool| rows.iter().filter(|row| f(row)).count() as u64;
+        let largest = |f: &dyn Fn(&StepRow) -> f64| rows.iter().map(f).fold(0.0, f64::max);
+        let mut histogram = BTreeMap::new();
+        for row in rows.iter().filter(|row| row.contacts > 0) {
+            *histogram.entry(row.rounds_of_a_part()).or_insert(0) += 1;
+        }
+        let touching: u64 = histogram.values().sum();
+        let few: u64 = histogram.iter().filter(|(rounds, _)| **rounds <= 3).map(|(_, count)| count).sum();
+        let residuals = [
+            largest(&|r| r.complementarity_residual),
+            largest(&|r| r.friction_residual),
+            largest(&|r| r.dynamics_residual),
+        ];
+        let last = rows.last().cloned().unwrap_or_default();
+        let sum = |f: &dyn Fn(&StepRow) -> f64| rows.iter().map(f).sum::<f64>();
+        let mut report = Report {
+            scene: facts.scene,
+            title: facts.title,
+            method: facts.method,
+            version: env!("CARGO_PKG_VERSION"),
+            vertices: facts.vertices,
+            tets: facts.tets,
+            bodies: facts.bodies,
+            steps: facts.steps,
+            steps_counted: rows.len() as u64,
+            dt: facts.dt,
+            duration: facts.steps as f64 * facts.dt,
+            contacts_max: rows.iter().map(|r| r.contacts).max().unwrap_or(0),
+            active_contacts_max: rows.iter().map(|r| r.active_contacts).max().unwrap_or(0),
+            cmr_rounds_histogram: histogram,
+            rounds_within_three: if touching == 0 { 1.0 } else { few as f64 / touching as f64 },
+            divisions: count(&|r| r.parts > 1),
+            failsafes: count(&StepRow::fail_safe_used),
+            pinched: count(&|r| r.certified_fraction < 1.0),
+            not_converged: count(&|r| r.not_converged > 0),
+            intersections: rows.iter().map(|r| u64::from(r.intersections)).sum(),
+            residual_max: residuals.iter().copied().fold(0.0, f64::max),
+            complementarity_residual_max: residuals[0],
+            friction_residual_max: residuals[1],
+            dynamics_residual_max: residuals[2],
+            iterations: Spread::of(rows.iter().map(|r| f64::from(r.iterations))),
+            seconds_per_step: Spread::of(rows.iter().map(|r| r.seconds)),
+            processor_seconds_per_step: Spread::of(rows.iter().map(|r| r.processor_seconds)),
+            seconds_by_stage: BTreeMap::from([
+                ("dynamics", sum(&|r| r.dynamics)),
+                ("search", sum(&|r| r.search)),
+                ("rows", sum(&|r| r.rows)),
+                ("solve", sum(&|r| r.solve)),
+                ("detection", sum(&|r| r.detection)),
+                ("fail_safe", sum(&|r| r.fail_safe)),
+                ("certificate", sum(&|r| r.certificate)),
+                ("total", sum(&|r| r.seconds)),
+            ]),
+            kinetic_energy_end: last.kinetic_energy,
+            kinetic_energy_end_per_kg: if facts.mass > 0.0 { last.kinetic_energy / facts.mass } else { 0.0 },
+            elastic_energy_end: last.elastic_energy,
+            bytes_max: rows.iter().map(|r| r.bytes).max().unwrap_or(0),
+            threads: facts.threads,
+            jitter: facts.jitter,
+            up: if facts.up == Up::Y { "y" } else { "z" },
+            floor: facts.floor,
+            frames: facts.frames,
+            frames_per_second: facts.frames_per_second,
+            hash: format!("{:016x}", facts.hash),
+            interrupted: facts.interrupted,
+            bounds_broken: Vec::new(),
+        };
+        report.bounds_broken = broken(&report, bounds, &facts.centres, facts.whole);
+        report
+    }
+}
+
+/// The bounds that a run broke, each with the number that broke it.
+fn broken(report: &Report, bounds: &Bounds, centres: &[[Centre; 2]], whole: bool) -> Vec<String> {
+    let mut out = Vec::new();
+    if report.intersections > 0 {
+        out.push(format!("intersections: {} certified, none may be", report.intersections));
+    }
+    let mut at_most = |name: &str, value: f64, bound: Option<f64>| {
+        if let Some(bound) =
+            bound.filter(|bound| value.partial_cmp(bound) != Some(std::cmp::Ordering::Less) && value != *bound)
+        {
+            out.push(format!("{name}: {value}, at most {bound}"));
+        }
+    };
+    let number = |bound: Option<u32>| bound.map(f64::from);
+    at_most("contacts_max", f64::from(report.contacts_max), number(bounds.contacts_max));
+    at_most("divisions_max", report.divisions as f64, number(bounds.divisions_max));
+    at_most("fail_safes_max", report.failsafes as f64, number(bounds.fail_safes_max));
+    at_most("pinched_max", report.pinched as f64, number(bounds.pinched_max));
+    at_most("not_converged_max", report.not_converged as f64, number(bounds.not_converged_max));
+    // The least is the greatest with both signs turned.
+    at_most("minus rounds_within_three_min", -report.rounds_within_three, bounds.rounds_within_three_min.map(|b| -b));
+    if !whole {
+        return out;
+    }
+    at_most("kinetic_energy_end_max", report.kinetic_energy_end_per_kg, bounds.kinetic_energy_end_max);
+    at_most("minus contacts_min", -f64::from(report.contacts_max), number(bounds.contacts_min).map(|b| -b));
+    for (bound, [start, end]) in bounds.body.iter().zip(centres) {
+        let direction = unit(bound.direction).unwrap_or_default();
+        let travel = dot(direction, sub(end.position, start.position));
+        let speed = dot(direction, end.velocity);
+        let name = &bound.name;
+        at_most(&format!("{name} travel_max"), travel, bound.travel_max);
+        at_most(&format!("{name} minus travel_min"), -travel, bound.travel_min.map(|b| -b));
+        at_most(&format!("{name} speed_max"), speed, bound.speed_max);
+        at_most(&format!("{name} minus speed_min"), -speed, bound.speed_min.map(|b| -b));
+    }
+    out
+}

@@ -1,0 +1,10 @@
+//! The runner, as a person uses it: scene files with faults, snapshots and interrupts, what it writes, and the scenes of
+//! `examples/scenes` with their bounds.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod command;
+
+mod faults;
+mod outputs;
+mod resume;
+mod scenes;
