@@ -215,7 +215,7 @@ impl Builder<'_> {
         };
         let options = self.options(&table.contact(), at)?;
         for (name, pose) in copies(&table.name, &table.placement, table.copies.as_ref()) {
-            let amount = self.jitter_amount(&mesh.positions, &faces_of(&mesh.tetrahedra));
+            let amount = self.jitter_amount(&mesh.positions, &mesh.tetrahedra);
             let shift = self.random().map_or([0.0; 3], |mut random| scale(amount, random.in_ball()));
             let positions: Vec<Vec3> = mesh.positions.iter().map(|x| add(pose.transform(*x), shift)).collect();
             let (node_forces, script) =
@@ -352,10 +352,6 @@ impl Builder<'_> {
             1e-3 * elements.iter().map(length).sum::<f64>() / elements.len().max(1) as f64
         })
     }
-}
-
-fn faces_of(tetrahedra: &[[u32; 4]]) -> Vec<[u32; 4]> {
-    tetrahedra.to_vec()
 }
 
 /// Names and poses of the copies of a body, or of itself.

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 pub struct Report {
     pub scene: String,
     pub title: String,
+    pub about: String,
     pub method: String,
     pub version: &'static str,
     pub vertices: usize,
@@ -70,6 +71,7 @@ pub struct Report {
 pub struct Facts {
     pub scene: String,
     pub title: String,
+    pub about: String,
     pub method: String,
     pub vertices: usize,
     pub tets: usize,
@@ -111,6 +113,7 @@ impl Report {
         let mut report = Report {
             scene: facts.scene,
             title: facts.title,
+            about: facts.about,
             method: facts.method,
             version: env!("CARGO_PKG_VERSION"),
             vertices: facts.vertices,
@@ -167,39 +170,40 @@ impl Report {
 
 /// The bounds that a run broke, each with the number that broke it.
 fn broken(report: &Report, bounds: &Bounds, centres: &[[Centre; 2]], whole: bool) -> Vec<String> {
-    let mut out = Vec::new();
-    if report.intersections > 0 {
-        out.push(format!("intersections: {} certified, none may be", report.intersections));
-    }
-    let mut at_most = |name: &str, value: f64, bound: Option<f64>| {
-        if let Some(bound) =
-            bound.filter(|bound| value.partial_cmp(bound) != Some(std::cmp::Ordering::Less) && value != *bound)
-        {
-            out.push(format!("{name}: {value}, at most {bound}"));
+    let mut checks = vec![
+        at_most("intersections", report.intersections as f64, Some(0.0)),
+        at_most("contacts_max", f64::from(report.contacts_max), bounds.contacts_max.map(f64::from)),
+        at_most("divisions_max", report.divisions as f64, bounds.divisions_max.map(f64::from)),
+        at_most("fail_safes_max", report.failsafes as f64, bounds.fail_safes_max.map(f64::from)),
+        at_most("pinched_max", report.pinched as f64, bounds.pinched_max.map(f64::from)),
+        at_most("not_converged_max", report.not_converged as f64, bounds.not_converged_max.map(f64::from)),
+        at_least("rounds_within_three_min", report.rounds_within_three, bounds.rounds_within_three_min),
+    ];
+    if whole {
+        checks.push(at_least("contacts_min", f64::from(report.contacts_max), bounds.contacts_min.map(f64::from)));
+        checks.push(at_most("kinetic_energy_end_max", report.kinetic_energy_end_per_kg, bounds.kinetic_energy_end_max));
+        for (bound, [start, end]) in bounds.body.iter().zip(centres) {
+            let direction = unit(bound.direction).unwrap_or_default();
+            let travel = dot(direction, sub(end.position, start.position));
+            let speed = dot(direction, end.velocity);
+            let name = |what: &str| format!("{} {what}", bound.name);
+            checks.push(at_least(&name("travel_min"), travel, bound.travel_min));
+            checks.push(at_most(&name("travel_max"), travel, bound.travel_max));
+            checks.push(at_least(&name("speed_min"), speed, bound.speed_min));
+            checks.push(at_most(&name("speed_max"), speed, bound.speed_max));
         }
-    };
-    let number = |bound: Option<u32>| bound.map(f64::from);
-    at_most("contacts_max", f64::from(report.contacts_max), number(bounds.contacts_max));
-    at_most("divisions_max", report.divisions as f64, number(bounds.divisions_max));
-    at_most("fail_safes_max", report.failsafes as f64, number(bounds.fail_safes_max));
-    at_most("pinched_max", report.pinched as f64, number(bounds.pinched_max));
-    at_most("not_converged_max", report.not_converged as f64, number(bounds.not_converged_max));
-    // The least is the greatest with both signs turned.
-    at_most("minus rounds_within_three_min", -report.rounds_within_three, bounds.rounds_within_three_min.map(|b| -b));
-    if !whole {
-        return out;
     }
-    at_most("kinetic_energy_end_max", report.kinetic_energy_end_per_kg, bounds.kinetic_energy_end_max);
-    at_most("minus contacts_min", -f64::from(report.contacts_max), number(bounds.contacts_min).map(|b| -b));
-    for (bound, [start, end]) in bounds.body.iter().zip(centres) {
-        let direction = unit(bound.direction).unwrap_or_default();
-        let travel = dot(direction, sub(end.position, start.position));
-        let speed = dot(direction, end.velocity);
-        let name = &bound.name;
-        at_most(&format!("{name} travel_max"), travel, bound.travel_max);
-        at_most(&format!("{name} minus travel_min"), -travel, bound.travel_min.map(|b| -b));
-        at_most(&format!("{name} speed_max"), speed, bound.speed_max);
-        at_most(&format!("{name} minus speed_min"), -speed, bound.speed_min.map(|b| -b));
-    }
-    out
+    checks.into_iter().flatten().collect()
+}
+
+/// What is wrong unless the value is at most the bound; not a number is wrong.
+fn at_most(name: &str, value: f64, bound: Option<f64>) -> Option<String> {
+    let bound = bound?;
+    if value <= bound { None } else { Some(format!("{name}: {value}, at most {bound}")) }
+}
+
+/// What is wrong unless the value is at least the bound; not a number is wrong.
+fn at_least(name: &str, value: f64, bound: Option<f64>) -> Option<String> {
+    let bound = bound?;
+    if value >= bound { None } else { Some(format!("{name}: {value}, at least {bound}")) }
 }

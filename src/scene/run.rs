@@ -278,6 +278,7 @@ impl<'a> Run<'a> {
         let facts = Facts {
             scene: self.options.scene.file_stem().unwrap_or_default().to_string_lossy().to_string(),
             title: self.file.title.clone(),
+            about: self.file.about.clone(),
             method: self.options.method.clone(),
             vertices: self.scene.vertices,
             tets: self.scene.tetrahedra,

@@ -48,14 +48,19 @@ macro_rules! scenes {
 }
 
 scenes! {
+    bars 100,
     crumple 25,
-    drape 15,
+    drape 35,
     falling_cloth 30,
     falling_cloth_rough 30,
     incline 200,
     incline_sticking 200,
+    needle 30,
     pile 30,
+    ring_shot 12,
     rolling_sphere 60,
     soft_pile 6,
     stack 60,
+    twisted_column 60,
+    two_bar 100,
 }
