@@ -43,9 +43,12 @@ pub struct SourceMesh {
     pub tetrahedra: Vec<[u32; 4]>,
 }
 
+/// A number with the name of its field.
+type Named<T> = (&'static str, T);
+
 impl MeshSource {
     pub fn check(&self, at: &str) -> Result<(), FieldFault> {
-        let (kind, lengths, counts): (&str, Vec<(&str, f64)>, Vec<(&str, usize)>) = match self {
+        let (kind, lengths, counts): (&str, Vec<Named<f64>>, Vec<Named<usize>>) = match self {
             MeshSource::Grid { cells, size } => {
                 ("grid", size.map(|s| ("size", s)).to_vec(), cells.map(|c| ("cells", c)).to_vec())
             }

@@ -226,7 +226,7 @@ impl<'a> Run<'a> {
     fn frame(&mut self, last: bool) -> Result<(), Failure> {
         let Some(out) = &self.options.out else { return Ok(()) };
         let io = |e: io::Error| Failure::Io(format!("{}: {e}", out.display()));
-        let due = self.step % self.steps_per_frame == 0;
+        let due = self.step.is_multiple_of(self.steps_per_frame);
         let path = out.join("frames").join(format!("frame_{:06}.obj", self.step));
         if self.file.output.obj && (due || last) && !path.exists() {
             write_obj(&self.scene, &path).map_err(io)?;

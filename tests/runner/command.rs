@@ -21,10 +21,6 @@ impl Folder {
         path.display().to_string()
     }
 
-    pub fn path(&self, name: &str) -> String {
-        self.0.join(name).display().to_string()
-    }
-
     pub fn read(&self, name: &str) -> String {
         let path = self.0.join(name);
         std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
