@@ -137,7 +137,7 @@
 #define SGN_ERROR_BUDGET_EXCEEDED (-15)
 
 /**
- * Cancelled by the host. Reserved: this version cannot be cancelled.
+ * The step was cancelled by the host; the world is as it was before it.
  */
 #define SGN_ERROR_CANCELLED (-16)
 
@@ -649,6 +649,26 @@
  * Pairs that touch the connected tangled component pass until it has separated; everything else keeps the promise.
  */
 #define SGN_POLICY_PASS 1
+
+/**
+ * Unconstrained dynamics of bodies that the library drives.
+ */
+#define SGN_PHASE_DYNAMICS 0
+
+/**
+ * The start state is checked.
+ */
+#define SGN_PHASE_START 1
+
+/**
+ * A round: contacts, constrained dynamics, continuous detection.
+ */
+#define SGN_PHASE_ROUND 2
+
+/**
+ * Rigid zones and held vertices.
+ */
+#define SGN_PHASE_FAIL_SAFE 3
 
 /**
  * Flag of a step: certify the end state by exact predicates.
@@ -1608,6 +1628,17 @@ typedef int32_t SgnFrictionCone;
 typedef int32_t SgnPolicy;
 
 /**
+ * Phase of a step.
+ */
+typedef int32_t SgnPhase;
+
+/**
+ * Told before each phase of a step, on the thread that steps, with the fraction of the step that is done. Returns 0 to
+ * cancel. Calls into the world return `SGN_ERROR_BUSY`. Must not throw.
+ */
+typedef int32_t (*SgnProgressCallback)(void *user, SgnPhase phase, double fraction);
+
+/**
  * A step to be made. Fill with `sgn_step_desc_init`, then set `dt`. All tolerances are relative, all caps are counters.
  */
 typedef struct SgnStepDesc {
@@ -1671,6 +1702,14 @@ typedef struct SgnStepDesc {
    * A part that turns by more than this angle is subdivided in time, in radians, positive.
    */
   double turn_max;
+  /**
+   * Told before each phase, may cancel; NULL: none. Default: NULL.
+   */
+  SgnProgressCallback progress_callback;
+  /**
+   * Handed to the callback.
+   */
+  void *progress_user;
 } SgnStepDesc;
 
 /**
@@ -2051,6 +2090,10 @@ typedef struct SgnApi {
                                    void *buffer,
                                    uint64_t capacity,
                                    uint64_t *written);
+  /**
+   * See `sgn_world_cancel`.
+   */
+  SgnResult (*world_cancel)(struct SgnWorld *world);
   /**
    * See `sgn_world_snapshot_load`.
    */
@@ -2503,12 +2546,21 @@ SGN_API SgnResult sgn_step_report_init(struct SgnStepReport *report, size_t size
  * Thread: exclusive; log callbacks come on this thread. Notes (the gravest is returned, all are in the report):
  * TANGLED_PAIRS, FAIL_SAFE_USED, NOT_CONVERGED, SUBDIVIDED. Errors (the world is then as it was, PINCHED excepted):
  * NULL_ARGUMENT, BAD_STRUCT, UNSUPPORTED_STRUCT, INVALID_ARGUMENT, NON_FINITE_INPUT, UNSUPPORTED, INTERSECTING_START,
- * PINCHED, SINGULAR_SYSTEM, OUT_OF_MEMORY, BUSY, POISONED, PANIC.
+ * PINCHED, SINGULAR_SYSTEM, OUT_OF_MEMORY, CANCELLED, BUSY, POISONED, PANIC.
  */
 SGN_API
 SgnResult sgn_world_step(struct SgnWorld *world,
                          const struct SgnStepDesc *desc,
                          struct SgnStepReport *report);
+
+/**
+ * Cancels the step that is running in the world: it returns CANCELLED before its next phase, and the world is as it was
+ * before it. Without a running step it does nothing.
+ *
+ * Thread: any, also while the world is at work, and in its callbacks. Errors: NULL_ARGUMENT.
+ */
+SGN_API
+SgnResult sgn_world_cancel(struct SgnWorld *world);
 
 /**
  * Pulls an attribute of the contacts of the last step. With `view` NULL only their number is written, for the caller to

@@ -181,6 +181,8 @@ pub struct SgnApi {
             written: *mut u64,
         ) -> SgnResult,
     >,
+    /// See `sgn_world_cancel`.
+    pub world_cancel: Option<unsafe extern "C" fn(world: *mut SgnWorld) -> SgnResult>,
     /// See `sgn_world_snapshot_load`.
     pub world_snapshot_load:
         Option<unsafe extern "C" fn(world: *mut SgnWorld, buffer: *const c_void, size: u64) -> SgnResult>,
@@ -203,7 +205,7 @@ pub struct SgnApi {
 // SAFETY: repr(C) without padding; numbers and nullable function pointers.
 unsafe impl Growing for SgnApi {
     const NAME: &'static str = "SgnApi";
-    const FIRST_SIZE: usize = 432;
+    const FIRST_SIZE: usize = 440;
     fn defaults() -> Self {
         // SAFETY: all zero is a valid table of no functions.
         unsafe { std::mem::zeroed() }
@@ -285,6 +287,7 @@ const TABLE: SgnApi = SgnApi {
     world_pull_witnesses: Some(super::sgn_world_pull_witnesses),
     world_snapshot_size: Some(super::sgn_world_snapshot_size),
     world_snapshot_save: Some(super::sgn_world_snapshot_save),
+    world_cancel: Some(super::sgn_world_cancel),
     world_snapshot_load: Some(super::sgn_world_snapshot_load),
     sheet_desc_init: Some(super::sgn_sheet_desc_init),
     solid_desc_init: Some(super::sgn_solid_desc_init),

@@ -50,7 +50,7 @@ pub const SGN_ERROR_SINGULAR_SYSTEM: i32 = -13;
 pub const SGN_ERROR_OUT_OF_MEMORY: i32 = -14;
 /// The byte budget does not allow it. Reserved: this version has no budget.
 pub const SGN_ERROR_BUDGET_EXCEEDED: i32 = -15;
-/// Cancelled by the host. Reserved: this version cannot be cancelled.
+/// The step was cancelled by the host; the world is as it was before it.
 pub const SGN_ERROR_CANCELLED: i32 = -16;
 /// The world is in use: by a step on another thread, or by the call that this callback comes from.
 pub const SGN_ERROR_BUSY: i32 = -17;

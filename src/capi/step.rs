@@ -3,12 +3,14 @@
 use super::boundary::{call, change};
 use super::context::{SGN_LOG_INFO, SGN_LOG_WARNING};
 use super::status::{
-    Failure, SGN_ERROR_INVALID_ARGUMENT, SGN_ERROR_NON_FINITE_INPUT, SGN_ERROR_UNSUPPORTED, SGN_NOTE_FAIL_SAFE_USED,
-    SGN_NOTE_NOT_CONVERGED, SGN_NOTE_SUBDIVIDED, SGN_NOTE_TANGLED_PAIRS, SGN_OK, SgnResult,
+    Failure, SGN_ERROR_INVALID_ARGUMENT, SGN_ERROR_NON_FINITE_INPUT, SGN_ERROR_NULL_ARGUMENT, SGN_ERROR_UNSUPPORTED,
+    SGN_NOTE_FAIL_SAFE_USED, SGN_NOTE_NOT_CONVERGED, SGN_NOTE_SUBDIVIDED, SGN_NOTE_TANGLED_PAIRS, SGN_OK, SgnResult,
 };
 use super::structs::{self, Growing};
 use super::world::SgnWorld;
-use crate::model::{FrictionCone, Settings, SolverChoice, StartPolicy, StepReport};
+use crate::model::{FrictionCone, Phase, Settings, SolverChoice, StartPolicy, StepReport, Watch};
+use std::ffi::c_void;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Contact method.
 pub type SgnMethod = i32;
@@ -48,6 +50,21 @@ pub const SGN_POLICY_REFUSE: i32 = 0;
 /// Pairs that touch the connected tangled component pass until it has separated; everything else keeps the promise.
 pub const SGN_POLICY_PASS: i32 = 1;
 
+/// Phase of a step.
+pub type SgnPhase = i32;
+/// Unconstrained dynamics of bodies that the library drives.
+pub const SGN_PHASE_DYNAMICS: i32 = 0;
+/// The start state is checked.
+pub const SGN_PHASE_START: i32 = 1;
+/// A round: contacts, constrained dynamics, continuous detection.
+pub const SGN_PHASE_ROUND: i32 = 2;
+/// Rigid zones and held vertices.
+pub const SGN_PHASE_FAIL_SAFE: i32 = 3;
+
+/// Told before each phase of a step, on the thread that steps, with the fraction of the step that is done. Returns 0 to
+/// cancel. Calls into the world return `SGN_ERROR_BUSY`. Must not throw.
+pub type SgnProgressCallback = Option<unsafe extern "C" fn(user: *mut c_void, phase: SgnPhase, fraction: f64) -> i32>;
+
 /// Flag of a step: certify the end state by exact predicates.
 pub const SGN_STEP_CERTIFY: u64 = 1;
 
@@ -85,12 +102,16 @@ pub struct SgnStepDesc {
     pub proximity_factor: f64,
     /// A part that turns by more than this angle is subdivided in time, in radians, positive.
     pub turn_max: f64,
+    /// Told before each phase, may cancel; NULL: none. Default: NULL.
+    pub progress_callback: SgnProgressCallback,
+    /// Handed to the callback.
+    pub progress_user: *mut c_void,
 }
 
-// SAFETY: repr(C) without padding; numbers.
+// SAFETY: repr(C) without padding; numbers, a pointer and a nullable function.
 unsafe impl Growing for SgnStepDesc {
     const NAME: &'static str = "SgnStepDesc";
-    const FIRST_SIZE: usize = 88;
+    const FIRST_SIZE: usize = 104;
     fn defaults() -> Self {
         let s = Settings::default();
         SgnStepDesc {
@@ -109,6 +130,8 @@ unsafe impl Growing for SgnStepDesc {
             recovery_fraction: s.recovery_fraction,
             proximity_factor: s.proximity_factor,
             turn_max: s.turn_max,
+            progress_callback: None,
+            progress_user: std::ptr::null_mut(),
         }
     }
 }
@@ -341,7 +364,7 @@ pub unsafe extern "C" fn sgn_step_report_init(report: *mut SgnStepReport, size: 
 /// Thread: exclusive; log callbacks come on this thread. Notes (the gravest is returned, all are in the report):
 /// TANGLED_PAIRS, FAIL_SAFE_USED, NOT_CONVERGED, SUBDIVIDED. Errors (the world is then as it was, PINCHED excepted):
 /// NULL_ARGUMENT, BAD_STRUCT, UNSUPPORTED_STRUCT, INVALID_ARGUMENT, NON_FINITE_INPUT, UNSUPPORTED, INTERSECTING_START,
-/// PINCHED, SINGULAR_SYSTEM, OUT_OF_MEMORY, BUSY, POISONED, PANIC.
+/// PINCHED, SINGULAR_SYSTEM, OUT_OF_MEMORY, CANCELLED, BUSY, POISONED, PANIC.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sgn_world_step(
     world: *mut SgnWorld,
@@ -350,6 +373,7 @@ pub unsafe extern "C" fn sgn_world_step(
 ) -> SgnResult {
     // SAFETY: the caller vouches for the pointers.
     unsafe {
+        let Some(SgnWorld { cancelled, .. }) = world.as_ref() else { return SGN_ERROR_NULL_ARGUMENT };
         change(world, "sgn_world_step", |world, context| {
             let desc = structs::read(desc)?;
             let settings = desc.settings()?;
@@ -361,7 +385,10 @@ pub unsafe extern "C" fn sgn_world_step(
                 }
                 answer
             };
-            match world.step(&settings, desc.dt, context.par()) {
+            cancelled.store(false, Ordering::Relaxed);
+            let host = ProgressOfHost { callback: desc.progress_callback, user: desc.progress_user, cancelled };
+            let told = |phase, fraction| host.goes_on(phase, fraction);
+            match world.step_watched(&settings, desc.dt, context.par(), Watch { told: Some(&told) }) {
                 Ok(given) => {
                     let answer = hand_over(&given);
                     let level = if answer.notes == 0 { SGN_LOG_INFO } else { SGN_LOG_WARNING };
@@ -376,6 +403,44 @@ pub unsafe extern "C" fn sgn_world_step(
                 }
             }
         })
+    }
+}
+
+/// Cancels the step that is running in the world: it returns CANCELLED before its next phase, and the world is as it was
+/// before it. Without a running step it does nothing.
+///
+/// Thread: any, also while the world is at work, and in its callbacks. Errors: NULL_ARGUMENT.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sgn_world_cancel(world: *mut SgnWorld) -> SgnResult {
+    call(|| {
+        // SAFETY: the caller vouches for the pointer.
+        let world = unsafe { world.as_ref() }.ok_or_else(|| Failure::null("world"))?;
+        world.cancelled.store(true, Ordering::Relaxed);
+        Ok(SGN_OK)
+    })
+}
+
+/// The host as it watches a step.
+struct ProgressOfHost<'a> {
+    callback: SgnProgressCallback,
+    user: *mut c_void,
+    cancelled: &'a AtomicBool,
+}
+
+// SAFETY: the callback is called on the thread that steps, and nowhere else; the rest is atomic or constant.
+unsafe impl Sync for ProgressOfHost<'_> {}
+
+impl ProgressOfHost<'_> {
+    fn goes_on(&self, phase: Phase, fraction: f64) -> bool {
+        let number = match phase {
+            Phase::Dynamics => SGN_PHASE_DYNAMICS,
+            Phase::Start => SGN_PHASE_START,
+            Phase::Round => SGN_PHASE_ROUND,
+            Phase::FailSafe => SGN_PHASE_FAIL_SAFE,
+        };
+        // SAFETY: the host gave the callback for this use.
+        let agreed = self.callback.is_none_or(|callback| unsafe { callback(self.user, number, fraction) } != 0);
+        agreed && !self.cancelled.load(Ordering::Relaxed)
     }
 }
 

@@ -58,6 +58,8 @@ pub struct SgnWorld {
     pub(super) context: Arc<ContextShared>,
     pub(super) world: RwLock<World>,
     pub(super) poisoned: AtomicBool,
+    /// Set by `sgn_world_cancel`, cleared when a step begins.
+    pub(super) cancelled: AtomicBool,
 }
 
 /// Fills `desc` with defaults; `size` is `sizeof(SgnWorldDesc)`.
@@ -95,6 +97,7 @@ pub unsafe extern "C" fn sgn_world_create(
                 context: context.clone(),
                 world: RwLock::new(World::new()),
                 poisoned: AtomicBool::new(false),
+                cancelled: AtomicBool::new(false),
             };
             out.write_unaligned(Box::into_raw(Box::new(world)));
             Ok(SGN_OK)

@@ -10,7 +10,8 @@ use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing, intersect
 use crate::fail_safe::parts_of_step;
 use crate::math::{Vec3, is_finite};
 use crate::model::{
-    BuildError, Drives, Kind, Model, Segment, Settings, StartPolicy, State, StepError, StepReport, StepResult,
+    BuildError, Drives, Kind, Model, Phase, Segment, Settings, StartPolicy, State, StepError, StepReport, StepResult,
+    Watch,
 };
 use crate::parallel::Par;
 use std::time::Instant;
@@ -48,20 +49,38 @@ pub fn advance(
     scratch: &mut Scratch,
     par: Par,
 ) -> Result<StepReport, StepError> {
+    advance_watched(model, state, drives, memory, settings, dt, result, scratch, par, Watch::default())
+}
+
+/// [`advance`] with somebody who is told how far it has come and may stop it between phases: `Cancelled`.
+pub fn advance_watched(
+    model: &Model,
+    state: &mut State,
+    drives: &Drives,
+    memory: &mut Memory,
+    settings: &Settings,
+    dt: f64,
+    result: &mut StepResult,
+    scratch: &mut Scratch,
+    par: Par,
+    watch: Watch,
+) -> Result<StepReport, StepError> {
     let (mut whole, mut clock) = (Instant::now(), Instant::now());
     // (1) What was pushed.
     check_inputs(model, state, drives, settings, dt)?;
     // (2) A, b and unconstrained velocities of MODEL bodies, HOST bodies bring theirs; the metric.
+    watch.ask(Phase::Dynamics, 0.0)?;
     let undivided = Segment { model, drives, step_start: state, start: state, from: 0.0, to: 1.0, dt };
     let driven = Driven::new(&undivided, par)?;
     let filter = BodyFilter::new(model);
     let mut account = StepAccount::new(model, state, &driven.drives);
     account.report.times.dynamics += lap(&mut clock);
     // (3) The start state: certified, refused, or tangled.
+    watch.ask(Phase::Start, 0.0)?;
     let mut passing = start_state(model, &filter, state, memory, settings, &mut account.report, scratch, par)?;
     account.report.times.certificate += lap(&mut clock);
     // (4) to (7), part by part.
-    let around = Surroundings { metric: &driven.metric, filter: &filter, settings, par };
+    let around = Surroundings { metric: &driven.metric, filter: &filter, settings, par, watch };
     let pinch = run_parts(&around, &undivided, &driven, memory, &mut passing, scratch, &mut account)?;
     // (8) Commit and report.
     commit((&filter, settings, par), model, state, memory, dt, result, &passing, scratch, &mut account);
@@ -103,7 +122,7 @@ fn run_parts(
         account.rounds.not_converged |= !driven.converged;
         account.report.times.dynamics += lap(&mut clock);
         // (4) to (6) Contacts, rows, anticipation, continuous detection, round by round.
-        let refined = refine(around, &segment, passing, &warm, scratch, &mut account.rounds);
+        let refined = refine(around, &segment, passing, &warm, scratch, &mut account.rounds)?;
         if refined.hits.is_empty() {
             account.add_part(model, around, refined, share, segment.dt);
             warm.keep_contacts(model, &account.last.set, segment.dt);
@@ -117,6 +136,7 @@ fn run_parts(
             continue;
         }
         let mut clock = Instant::now();
+        around.watch.ask(Phase::FailSafe, part.from)?;
         let outcome = fall_back(around, &segment, passing, refined, scratch);
         account.report.times.fail_safe += lap(&mut clock);
         match outcome {

@@ -5,7 +5,7 @@ use super::{ContactProblem, Memory, Scratch, SolverReport, SolverScratch, solve}
 use crate::constraint::{BuiltRows, Linearisation, Metric, build_rows};
 use crate::contact_search::{BodyFilter, Hit, Passing, near_contacts, swept_hits};
 use crate::math::{Vec3, add, mat_vec, norm, scale, sub};
-use crate::model::{Precision, Segment, Settings, State};
+use crate::model::{Phase, Precision, Segment, Settings, State, StepError, Watch};
 use crate::parallel::Par;
 use std::time::Instant;
 
@@ -43,6 +43,7 @@ pub(super) struct Surroundings<'a> {
     pub filter: &'a BodyFilter,
     pub settings: &'a Settings,
     pub par: Par<'a>,
+    pub watch: Watch<'a>,
 }
 
 /// A tentative end of a segment, clean if `hits` is empty.
@@ -95,7 +96,7 @@ pub(super) fn lap(from: &mut Instant) -> f64 {
     microseconds
 }
 
-/// Refines the constraint manifold until the tentative end is clean or the rounds are used up.
+/// Refines the constraint manifold until the tentative end is clean or the rounds are used up. Errors: cancelled.
 pub(super) fn refine(
     around: &Surroundings,
     segment: &Segment,
@@ -103,7 +104,7 @@ pub(super) fn refine(
     memory: &Memory,
     scratch: &mut Scratch,
     account: &mut RoundAccount,
-) -> Refined {
+) -> Result<Refined, StepError> {
     let (model, par) = (segment.model, around.par);
     let mut settings = *around.settings;
     let mut clock = Instant::now();
@@ -123,6 +124,7 @@ pub(super) fn refine(
     let mut clean: Option<Refined> = None;
     let mut rounds_left = settings.rounds_max.max(1);
     while rounds_left > 0 {
+        around.watch.ask(Phase::Round, segment.from)?;
         rounds_left -= 1;
         account.rounds += 1;
         let converged = solve_round(
@@ -159,7 +161,7 @@ pub(super) fn refine(
         if refined.hits.is_empty() {
             let settled = worst_linearisation(segment, &refined, &linear_end) <= LINEARISATION_SHARE;
             if settled && !refined.set.would_admit(end, ADMITTED_SHARE) {
-                return refined;
+                return Ok(refined);
             }
             clean = Some(refined.clone());
             refined.set.admit(model, end, ADMITTED_SHARE, memory, &settings, segment.dt);
@@ -173,7 +175,7 @@ pub(super) fn refine(
         }
         tightened = growth.missed > 0;
     }
-    clean.unwrap_or(refined)
+    Ok(clean.unwrap_or(refined))
 }
 
 /// Steps 4.1 and 4.2: rows about the last tentative motion, constrained dynamics, new velocities; whether the solver

@@ -44,6 +44,6 @@ mod splitting_start;
 mod stop_test;
 mod velocity_error;
 
-pub use advance::{Scratch, advance};
+pub use advance::{Scratch, advance, advance_watched};
 pub use memory::{Certified, Memory, RememberedContact};
 pub use problem::{ContactProblem, SolverReport, SolverScratch, solve};

@@ -9,6 +9,7 @@
 //! * `settings`: tolerances and work caps
 //! * `validate`: checks of descriptions
 //! * `report`: what a step did, and how it can fail
+//! * `watch`: what a host is told while a step is made
 
 mod body;
 mod dynamics;
@@ -19,6 +20,7 @@ mod settings;
 mod state;
 mod system;
 mod validate;
+mod watch;
 
 pub use crate::mesh::Surface;
 pub use body::{BlockRange, Body, BodyDescription, Kind, Model, Precision, default_half_thickness};
@@ -29,3 +31,4 @@ pub use report::{BuildError, ContactRecord, StageTimes, StepError, StepReport, W
 pub use settings::{FrictionCone, Settings, SolverChoice, StartPolicy};
 pub use state::{Drives, HalfSpace, State, StepResult};
 pub use system::{System, SystemDescription};
+pub use watch::{Phase, Told, Watch};

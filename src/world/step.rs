@@ -3,9 +3,9 @@
 use super::body::Body;
 use super::{Fault, World, WorldError};
 use crate::contact_search::{BodyFilter, intersections, swept_free};
-use crate::implicit_contact::advance;
+use crate::implicit_contact::advance_watched;
 use crate::math::ZERO;
-use crate::model::{BodyDescription, BuildError, Model, Settings, State, StepError, StepReport, System};
+use crate::model::{BodyDescription, BuildError, Model, Settings, State, StepError, StepReport, System, Watch};
 use crate::parallel::Par;
 
 /// A step that failed. When pinched, the world stands at the certified fraction and the report says how far.
@@ -29,6 +29,17 @@ impl World {
     /// On every error but `Pinched` bodies, results and contacts are as they were. Witnesses of intersections are kept
     /// for [`World::witnesses`].
     pub fn step(&mut self, settings: &Settings, dt: f64, par: Par) -> Result<StepReport, StepFailure> {
+        self.step_watched(settings, dt, par, Watch::default())
+    }
+
+    /// [`World::step`] with somebody who is told how far it has come and may stop it between phases: `Cancelled`.
+    pub fn step_watched(
+        &mut self,
+        settings: &Settings,
+        dt: f64,
+        par: Par,
+        watch: Watch,
+    ) -> Result<StepReport, StepFailure> {
         if !dt.is_finite() {
             return Err(WorldError::new(Fault::NonFinite, "the time step is not finite").value(dt).into());
         }
@@ -39,7 +50,7 @@ impl World {
         self.gather()?;
         self.witnesses.clear();
         self.check_pushed_starts(par)?;
-        let outcome = advance(
+        let outcome = advance_watched(
             &self.model,
             &mut self.state,
             &self.drives,
@@ -49,6 +60,7 @@ impl World {
             &mut self.result,
             &mut self.scratch,
             par,
+            watch,
         );
         match outcome {
             Ok(report) => {
@@ -220,7 +232,7 @@ impl World {
                 WorldError::new(Fault::SingularSystem, message).object(id).index(row)
             }
             StepError::BadInput(error) => self.build_failure(Fault::InvalidArgument, &error),
-            StepError::Cancelled => WorldError::new(Fault::Cancelled, "cancelled"),
+            StepError::Cancelled => WorldError::new(Fault::Cancelled, "the step was cancelled"),
             StepError::Pinched { report, .. } => {
                 WorldError::new(Fault::Pinched, "pinched").value(report.certified_fraction)
             }

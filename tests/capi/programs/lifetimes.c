@@ -139,6 +139,71 @@ static void re_entry(void) {
   OK(sgn_context_destroy(probe.context));
 }
 
+/* Who watches a step, and when he has seen enough: by his answer, or by a call. */
+typedef struct {
+  SgnWorld *world;
+  int calls, stop_at, by_call;
+  double fraction;
+} Watcher;
+
+static int32_t on_progress(void *user, SgnPhase phase, double fraction) {
+  Watcher *watcher = user;
+  uint64_t hash;
+  CHECK(phase >= SGN_PHASE_DYNAMICS && phase <= SGN_PHASE_FAIL_SAFE);
+  CHECK(fraction >= watcher->fraction && fraction < 1);
+  watcher->fraction = fraction;
+  GIVES(SGN_ERROR_BUSY, sgn_world_state_hash(watcher->world, &hash));
+  if (++watcher->calls != watcher->stop_at) return 1;
+  if (!watcher->by_call) return 0;
+  OK(sgn_world_cancel(watcher->world));
+  return 1;
+}
+
+static void cancelling(void) {
+  SgnContext *context = NULL;
+  Watcher watcher;
+  SgnBodyId cloth_id = {0}, ground_id = {0};
+  SgnDeformableDesc cloth_ = cloth_desc(&cloth);
+  SgnHalfSpaceDesc ground;
+  SgnStepDesc step;
+  uint64_t before, after;
+  int phases;
+  memset(&watcher, 0, sizeof watcher);
+  OK(sgn_context_create(SGN_ABI_VERSION, NULL, NULL, 0, &context));
+  OK(sgn_world_create(context, NULL, &watcher.world));
+  OK(sgn_deformable_create(watcher.world, &cloth_, &cloth_id));
+  OK(sgn_half_space_desc_init(&ground, sizeof ground));
+  ground.offset = -10;
+  OK(sgn_half_space_create(watcher.world, &ground, &ground_id));
+  OK(sgn_step_desc_init(&step, sizeof step));
+  step.dt = 0.01;
+  step.progress_callback = on_progress;
+  step.progress_user = &watcher;
+  before = state_hash(watcher.world);
+  GIVES(SGN_ERROR_NULL_ARGUMENT, sgn_world_cancel(NULL));
+  OK(sgn_world_cancel(watcher.world)); /* nothing runs: nothing is cancelled */
+  CHECK(sgn_world_step(watcher.world, &step, NULL) >= 0);
+  phases = watcher.calls;
+  CHECK(phases >= 3);
+  after = state_hash(watcher.world);
+  OK(sgn_world_destroy(watcher.world));
+  OK(sgn_world_create(context, NULL, &watcher.world));
+  OK(sgn_deformable_create(watcher.world, &cloth_, &cloth_id));
+  OK(sgn_half_space_create(watcher.world, &ground, &ground_id));
+  for (int i = 0; i < 2 * phases; i++) {
+    watcher.calls = 0, watcher.fraction = 0;
+    watcher.stop_at = 1 + i / 2, watcher.by_call = i % 2;
+    GIVES(SGN_ERROR_CANCELLED, sgn_world_step(watcher.world, &step, NULL));
+    CHECK(watcher.calls == watcher.stop_at);
+    CHECK(state_hash(watcher.world) == before);
+  }
+  watcher.stop_at = 0, watcher.fraction = 0;
+  CHECK(sgn_world_step(watcher.world, &step, NULL) >= 0);
+  CHECK(state_hash(watcher.world) == after);
+  OK(sgn_world_destroy(watcher.world));
+  OK(sgn_context_destroy(context));
+}
+
 /* A failed call is over when its message comes: the callback may even destroy the world and the context. */
 static void destroy_on_error(void *user, SgnLogLevel level, const char *message, uint64_t length) {
   Probe *probe = user;
@@ -268,6 +333,7 @@ static void bodies_come_and_go(void) {
 int main(void) {
   make_cloth(&cloth, 0.1, 0.5);
   re_entry();
+  cancelling();
   destruction_from_a_callback();
   errors_by_thread();
   bodies_come_and_go();
