@@ -49,7 +49,7 @@ pub fn advance(
     scratch: &mut Scratch,
     par: Par,
 ) -> Result<StepReport, StepError> {
-    advance_watched(model, state, drives, memory, settings, dt, result, scratch, par, Watch::default())
+    advance_watched(model, state, drives, memory, settings, dt, result, scratch, (par, Watch::default()))
 }
 
 /// [`advance`] with somebody who is told how far it has come and may stop it between phases: `Cancelled`.
@@ -62,8 +62,7 @@ pub fn advance_watched(
     dt: f64,
     result: &mut StepResult,
     scratch: &mut Scratch,
-    par: Par,
-    watch: Watch,
+    (par, watch): (Par, Watch),
 ) -> Result<StepReport, StepError> {
     let (mut whole, mut clock) = (Instant::now(), Instant::now());
     // (1) What was pushed.

@@ -59,8 +59,7 @@ impl World {
             dt,
             &mut self.result,
             &mut self.scratch,
-            par,
-            watch,
+            (par, watch),
         );
         match outcome {
             Ok(report) => {
