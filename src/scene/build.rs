@@ -42,6 +42,26 @@ struct PinGroup {
     nodes: Vec<(u32, Vec3)>,
     start: Pose,
     motion: Vec<Twist>,
+    follow: Option<Follow>,
+}
+
+/// The body that pins follow, and of each pin the nearest vertex of it.
+struct Follow {
+    body: usize,
+    vertices: Vec<u32>,
+}
+
+impl Follow {
+    /// Errors: there is no such body.
+    fn new(scene: &Scene, name: &str, nodes: &[(u32, Vec3)]) -> Option<Follow> {
+        let body = scene.bodies.iter().position(|body| body.name == name)?;
+        let positions = scene.world.positions(scene.bodies[body].id).ok()?;
+        let nearest = |x: Vec3| {
+            let distance = |v: &u32| norm(sub(positions[*v as usize], x));
+            (0..positions.len() as u32).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        };
+        Some(Follow { body, vertices: nodes.iter().map(|(_, x)| nearest(*x)).collect::<Option<_>>()? })
+    }
 }
 
 /// A world with its script.
@@ -67,6 +87,10 @@ impl Scene {
         let world = &mut builder.scene.world;
         world.set_gravity(file.gravity).map_err(|e| refused("gravity", &e))?;
         world.set_wind(file.wind).map_err(|e| refused("wind", &e))?;
+        // First, because pins follow them.
+        for (i, table) in file.kinematic.iter().enumerate() {
+            builder.kinematic(table, &format!("kinematic[{i}]"))?;
+        }
         for (i, table) in file.sheet.iter().enumerate() {
             builder.sheets(table, &format!("sheet[{i}]"))?;
         }
@@ -75,9 +99,6 @@ impl Scene {
         }
         for (i, table) in file.rigid.iter().enumerate() {
             builder.rigid(table, &format!("rigid[{i}]"))?;
-        }
-        for (i, table) in file.kinematic.iter().enumerate() {
-            builder.kinematic(table, &format!("kinematic[{i}]"))?;
         }
         for (i, table) in file.half_space.iter().enumerate() {
             let at = format!("half_space[{i}]");
@@ -99,6 +120,14 @@ impl Scene {
                 Script::Pins(groups) => {
                     let mut targets = self.world.node_positions(body.id)?.to_vec();
                     for group in groups {
+                        if let Some(follow) = &group.follow {
+                            let (from, to) = (self.scripted(follow.body, 0.0)?, self.scripted(follow.body, t)?);
+                            for ((node, x), v) in group.nodes.iter().zip(&follow.vertices) {
+                                let way = sub(to[*v as usize], from[*v as usize]);
+                                targets[*node as usize] = add(*x, way);
+                            }
+                            continue;
+                        }
                         let pose = moved(group.start, &group.motion, t);
                         for (node, x) in &group.nodes {
                             targets[*node as usize] =
@@ -116,6 +145,21 @@ impl Scene {
             }
         }
         Ok(())
+    }
+}
+
+impl Scene {
+    /// Where the vertices of a scripted body are at time `t`.
+    fn scripted(&self, body: usize, t: f64) -> Result<Vec<Vec3>, WorldError> {
+        let body = &self.bodies[body];
+        match &body.script {
+            Script::Frames(frames, pose) => Ok(frames.at(t, pose)),
+            Script::Pose(start, motion) => {
+                let pose = moved(*start, motion, t);
+                Ok(self.world.surface(body.id)?.rest.iter().map(|x| pose.transform(*x)).collect())
+            }
+            _ => Ok(self.world.positions(body.id)?.to_vec()),
+        }
     }
 }
 
@@ -167,7 +211,7 @@ impl Builder<'_> {
                 positions.iter_mut().for_each(|x| *x = add_scaled(*x, amount, random.in_ball()));
             }
             let (node_forces, script) =
-                nodes(&positions, &table.pins, [table.velocity, table.angular_velocity], table.drag, at)?;
+                nodes(&self.scene, &positions, &table.pins, [table.velocity, table.angular_velocity], table.drag, at)?;
             let topology = Topology { triangles: mesh.triangles.clone(), ..Topology::default() };
             let description = SheetDescription {
                 options,
@@ -219,7 +263,7 @@ impl Builder<'_> {
             let shift = self.random().map_or([0.0; 3], |mut random| scale(amount, random.in_ball()));
             let positions: Vec<Vec3> = mesh.positions.iter().map(|x| add(pose.transform(*x), shift)).collect();
             let (node_forces, script) =
-                nodes(&positions, &table.pins, [table.velocity, table.angular_velocity], table.drag, at)?;
+                nodes(&self.scene, &positions, &table.pins, [table.velocity, table.angular_velocity], table.drag, at)?;
             let embedded = surface.as_ref().map(|surface| {
                 let topology = Topology { triangles: surface.triangles.clone(), ..Topology::default() };
                 (surface.positions.clone(), topology)
@@ -368,6 +412,7 @@ fn copies(name: &str, placement: &Placement, copies: Option<&Copies>) -> Vec<(St
 
 /// Start velocities, pins and their script.
 fn nodes(
+    scene: &Scene,
     positions: &[Vec3],
     pins: &[Pin],
     [velocity, angular]: [Vec3; 2],
@@ -398,11 +443,15 @@ fn nodes(
         }
         let centre = pin.centre.unwrap_or_else(|| self::middle(found.iter().map(|v| &positions[*v as usize])));
         found.iter().for_each(|v| pinned[*v as usize] = true);
-        groups.push(PinGroup {
-            nodes: found.iter().map(|v| (*v, positions[*v as usize])).collect(),
-            start: Pose { position: centre, ..Pose::IDENTITY },
-            motion: pin.motion.clone(),
-        });
+        let nodes: Vec<(u32, Vec3)> = found.iter().map(|v| (*v, positions[*v as usize])).collect();
+        let follow = match &pin.follow {
+            None => None,
+            Some(name) => Some(Follow::new(scene, name, &nodes).ok_or_else(|| {
+                FieldFault::new(format!("{at}.pins[{i}].follow"), format!("the body '{name}' has no vertices"))
+            })?),
+        };
+        let start = Pose { position: centre, ..Pose::IDENTITY };
+        groups.push(PinGroup { nodes, start, motion: pin.motion.clone(), follow });
     }
     let script = if groups.is_empty() { Script::Free } else { Script::Pins(groups) };
     Ok((NodeForces { velocities, pinned, drag, ..NodeForces::default() }, script))

@@ -4,8 +4,8 @@ use super::fault::{FieldFault, Places, SceneFault};
 use super::mesh_source::MeshSource;
 use super::motion::{FramesTable, Twist};
 use super::placement::{Copies, Placement};
+use super::settings::SettingsTable;
 use crate::math::Vec3;
-use crate::model::{FrictionCone, Settings, SolverChoice, StartPolicy};
 use serde::Deserialize;
 
 /// A scene file.
@@ -68,87 +68,6 @@ pub enum Up {
     Y,
     #[default]
     Z,
-}
-
-/// Settings of the step; what is not given keeps its default.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SettingsTable {
-    pub solver: Option<Solver>,
-    pub friction_cone: Option<Cone>,
-    pub start: Option<Start>,
-    pub contact_tolerance: Option<f64>,
-    pub velocity_tolerance: Option<f64>,
-    pub iterations_max: Option<u32>,
-    pub splitting_iterations: Option<u32>,
-    pub rounds_max: Option<u32>,
-    pub halvings_max: Option<u32>,
-    pub recovery_fraction: Option<f64>,
-    pub proximity_factor: Option<f64>,
-    pub turn_max: Option<f64>,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Solver {
-    Automatic,
-    IterativeAnticipation,
-    LightAnticipation,
-    AcceleratedRelaxation,
-    AugmentedLagrangian,
-    FullAnticipation,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Cone {
-    Disc,
-    Pyramid,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Start {
-    Refuse,
-    Pass,
-}
-
-impl SettingsTable {
-    /// The settings, with every step certified.
-    pub fn settings(&self) -> Settings {
-        let d = Settings::default();
-        let solver = self.solver.map_or(d.solver, |solver| match solver {
-            Solver::Automatic => SolverChoice::Automatic,
-            Solver::IterativeAnticipation => SolverChoice::IterativeAnticipation,
-            Solver::LightAnticipation => SolverChoice::LightAnticipation,
-            Solver::AcceleratedRelaxation => SolverChoice::AcceleratedRelaxation,
-            Solver::AugmentedLagrangian => SolverChoice::AugmentedLagrangian,
-            Solver::FullAnticipation => SolverChoice::FullAnticipation,
-        });
-        let friction_cone = self.friction_cone.map_or(d.friction_cone, |cone| match cone {
-            Cone::Disc => FrictionCone::Disc,
-            Cone::Pyramid => FrictionCone::Pyramid,
-        });
-        let start_policy = self.start.map_or(d.start_policy, |start| match start {
-            Start::Refuse => StartPolicy::Refuse,
-            Start::Pass => StartPolicy::Pass,
-        });
-        Settings {
-            solver,
-            friction_cone,
-            start_policy,
-            contact_tolerance: self.contact_tolerance.unwrap_or(d.contact_tolerance),
-            velocity_tolerance: self.velocity_tolerance.unwrap_or(d.velocity_tolerance),
-            iterations_max: self.iterations_max.unwrap_or(d.iterations_max),
-            splitting_iterations: self.splitting_iterations.unwrap_or(d.splitting_iterations),
-            rounds_max: self.rounds_max.unwrap_or(d.rounds_max),
-            halvings_max: self.halvings_max.unwrap_or(d.halvings_max),
-            recovery_fraction: self.recovery_fraction.unwrap_or(d.recovery_fraction),
-            proximity_factor: self.proximity_factor.unwrap_or(d.proximity_factor),
-            turn_max: self.turn_max.unwrap_or(d.turn_max),
-            certify: true,
-        }
-    }
 }
 
 /// What `--out` writes.
@@ -379,6 +298,8 @@ pub struct Pin {
     pub centre: Option<Vec3>,
     #[serde(default)]
     pub motion: Vec<Twist>,
+    /// Name of a kinematic body: each pinned vertex keeps its distance to the body's vertex that is nearest at the start.
+    pub follow: Option<String>,
 }
 
 /// Material of a sheet.
@@ -499,6 +420,19 @@ impl SceneFile {
                 return Err(FieldFault::new(field, format!("the name '{name}' is taken")));
             }
         }
+        let pins = |kind: &str, i: usize, pins: &[Pin]| {
+            pins.iter().enumerate().find_map(|(k, pin)| {
+                let name = pin.follow.as_ref()?;
+                let known = self.kinematic.iter().any(|table| table.name == *name);
+                let message = format!("no kinematic body is named '{name}'");
+                (!known).then(|| FieldFault::new(format!("{kind}[{i}].pins[{k}].follow"), message))
+            })
+        };
+        let sheets = self.sheet.iter().enumerate().find_map(|(i, table)| pins("sheet", i, &table.pins));
+        let solids = || self.solid.iter().enumerate().find_map(|(i, table)| pins("solid", i, &table.pins));
+        if let Some(fault) = sheets.or_else(solids) {
+            return Err(fault);
+        }
         for (i, bound) in self.bounds.body.iter().enumerate() {
             if !names[..movable].iter().any(|(name, _)| *name == bound.name) {
                 let message = format!("no sheet, solid or rigid body is named '{}'", bound.name);
@@ -507,26 +441,6 @@ impl SceneFile {
             finite(bound.direction, &format!("bounds.body[{i}]"), "direction")?;
         }
         Ok(())
-    }
-}
-
-impl SettingsTable {
-    fn check(&self) -> Result<(), FieldFault> {
-        let at = "settings";
-        for (value, name) in [
-            (self.contact_tolerance, "contact_tolerance"),
-            (self.velocity_tolerance, "velocity_tolerance"),
-            (self.turn_max, "turn_max"),
-        ] {
-            value.map_or(Ok(()), |value| positive(value, at, name))?;
-        }
-        self.recovery_fraction.map_or(Ok(()), |value| not_negative(value, at, "recovery_fraction"))?;
-        match self.proximity_factor {
-            Some(factor) if !(factor >= 1.0 && factor.is_finite()) => {
-                Err(FieldFault::new("settings.proximity_factor", format!("finite and at least 1, not {factor}")))
-            }
-            _ => Ok(()),
-        }
     }
 }
 
@@ -640,6 +554,9 @@ fn check_pins(at: &str, pins: &[Pin]) -> Result<(), FieldFault> {
             return Err(FieldFault::new(format!("{at}.pins[{i}]"), "a pin names vertices or a box: vertices, within"));
         }
         check_motion(&format!("{at}.pins[{i}].motion"), &pin.motion)?;
+        if pin.follow.is_some() && !pin.motion.is_empty() {
+            return Err(FieldFault::new(format!("{at}.pins[{i}].follow"), "a pin has a motion or a body to follow"));
+        }
     }
     Ok(())
 }
@@ -673,7 +590,8 @@ pub fn positive(value: f64, at: &str, name: &str) -> Result<(), FieldFault> {
     Err(FieldFault::new(joined(at, name), format!("positive and finite, not {value}")))
 }
 
-fn not_negative(value: f64, at: &str, name: &str) -> Result<(), FieldFault> {
+/// Errors unless finite and not negative.
+pub fn not_negative(value: f64, at: &str, name: &str) -> Result<(), FieldFault> {
     if value >= 0.0 && value.is_finite() {
         return Ok(());
     }

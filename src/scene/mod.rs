@@ -2,6 +2,7 @@
 //!
 //! * `fault`: what is wrong with a scene file, with file, line and field
 //! * `file`: the tables of a scene file
+//! * `settings`: the table of settings
 //! * `placement`: where bodies and their copies stand
 //! * `mesh_source`: meshes from formulas and files
 //! * `motion`: prescribed motion
@@ -23,6 +24,7 @@ mod motion;
 mod placement;
 mod report;
 mod run;
+mod settings;
 mod statistics;
 mod usd;
 

@@ -81,6 +81,13 @@ fn faults_of_scene_files_are_named() {
             "rigid[0].mesh",
             "not closed",
         ),
+        (
+            "motion = [{ until = 0.1 }, { until = 0.3, velocity = [0.0, 0.0, 0.5] }] }]",
+            "follow = \"nobody\" }]",
+            "nobody",
+            "sheet[0].pins[0].follow",
+            "no kinematic body is named 'nobody'",
+        ),
         ("dt = 0.01", "dt = = 1", "dt = = 1", "", ""),
     ];
     folder.file("bad.obj", "v 0 0 0\nv 1 x 0\n");

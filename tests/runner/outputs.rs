@@ -21,9 +21,9 @@ fn the_final_line_has_what_was_promised() {
         assert!(line[name].is_number(), "{name}: {}", line[name]);
     }
     for name in ["mean", "median", "p95", "max"] {
-        for spread in ["seconds_per_step", "processor_seconds_per_step"] {
-            assert!(line[spread][name].as_f64().is_some_and(|x| x > 0.0), "{spread} {name}");
-        }
+        assert!(line["seconds_per_step"][name].as_f64().is_some_and(|x| x > 0.0), "{name}");
+        // Of the processor: counted in ticks of some milliseconds, a short step may have none.
+        assert!(line["processor_seconds_per_step"][name].as_f64().is_some_and(|x| x >= 0.0), "{name}");
     }
     for name in ["dynamics", "search", "rows", "solve", "detection", "fail_safe", "certificate", "total"] {
         assert!(line["seconds_by_stage"][name].is_number(), "{name}");
@@ -86,14 +86,14 @@ fn frames_are_certified_by_the_library() {
     for path in &frames {
         let groups = read_obj(&std::fs::read_to_string(path).unwrap());
         let names: Vec<&str> = groups.iter().map(|g| g.0.as_str()).collect();
-        assert_eq!(names, ["cloth", "carrier", "ball_0", "ball_1", "paddle"]);
-        assert_eq!(groups[4].1.len(), 20);
+        assert_eq!(names, ["paddle", "cloth", "carrier", "ball_0", "ball_1"]);
+        assert_eq!(groups[0].1.len(), 20);
         let positions: Vec<[f64; 3]> = groups.iter().flat_map(|g| g.1.iter().copied()).collect();
         let faces = groups.iter().flat_map(|g| g.2.iter().copied()).collect();
         let surface = Surface::from_triangles(positions, faces).unwrap();
         let primitives = Primitives { vertices: &surface.vertices, edges: &surface.edges, faces: &surface.faces };
         assert!(find(&primitives, &surface.rest, &|_, _| true, Par::Serial).is_empty(), "{path:?}");
-        heights.push((groups[0].1[0], groups[4].1[0]));
+        heights.push((groups[1].1[0], groups[0].1[0]));
     }
     // The pin stands for 0.1 s, rises by 0.1 m and stands; the paddle moves by 0.09 m and turns by 0.15.
     let rise = |i: usize| heights[i].0[2] - heights[0].0[2];
@@ -145,4 +145,24 @@ fn the_animated_cache_reads_back_as_the_frames() {
             first += positions.len() as u32;
         }
     }
+}
+
+#[test]
+fn a_pin_follows_a_scripted_body() {
+    let folder = Folder::new("follow");
+    let moving = "motion = [{ until = 0.1 }, { until = 0.3, velocity = [0.0, 0.0, 0.5] }] }]";
+    folder.file("scene.toml", &SMALL.replace(moving, "follow = \"paddle\" }]"));
+    report(&folder, &["scene.toml", "--out", "out"]);
+    let at = |frame: &str| {
+        let groups = read_obj(&folder.read(&format!("out/frames/{frame}.obj")));
+        (groups[1].1[0], groups[0].1.clone())
+    };
+    let ((pin, paddle), (later, moved)) = (at("frame_000000"), at("frame_000040"));
+    let distance = |x: &[f64; 3]| (0..3).map(|k| (x[k] - pin[k]).powi(2)).sum::<f64>();
+    let nearest = (0..paddle.len()).min_by(|a, b| distance(&paddle[*a]).total_cmp(&distance(&paddle[*b]))).unwrap();
+    for k in 0..3 {
+        let way = moved[nearest][k] - paddle[nearest][k];
+        assert!((later[k] - pin[k] - way).abs() < 1e-9, "{later:?}");
+    }
+    assert!(later[0] > pin[0] + 0.05);
 }

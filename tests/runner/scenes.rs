@@ -55,6 +55,7 @@ scenes! {
     falling_cloth_rough 30,
     incline 200,
     incline_sticking 200,
+    layered_dress 20,
     needle 30,
     pile 30,
     ring_shot 12,

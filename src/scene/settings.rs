@@ -1,0 +1,108 @@
+//! The table of settings.
+
+use super::fault::FieldFault;
+use super::file::{not_negative, positive};
+use crate::model::{FrictionCone, Settings, SolverChoice, StartPolicy};
+use serde::Deserialize;
+
+/// Settings of the step; what is not given keeps its default.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SettingsTable {
+    pub solver: Option<Solver>,
+    pub friction_cone: Option<Cone>,
+    pub start: Option<Start>,
+    pub contact_tolerance: Option<f64>,
+    pub velocity_tolerance: Option<f64>,
+    pub iterations_max: Option<u32>,
+    pub splitting_iterations: Option<u32>,
+    pub rounds_max: Option<u32>,
+    pub halvings_max: Option<u32>,
+    pub recovery_fraction: Option<f64>,
+    pub proximity_factor: Option<f64>,
+    pub turn_max: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Solver {
+    Automatic,
+    IterativeAnticipation,
+    LightAnticipation,
+    AcceleratedRelaxation,
+    AugmentedLagrangian,
+    FullAnticipation,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cone {
+    Disc,
+    Pyramid,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    Refuse,
+    Pass,
+}
+
+impl SettingsTable {
+    /// The settings, with every step certified.
+    pub fn settings(&self) -> Settings {
+        let d = Settings::default();
+        let solver = self.solver.map_or(d.solver, |solver| match solver {
+            Solver::Automatic => SolverChoice::Automatic,
+            Solver::IterativeAnticipation => SolverChoice::IterativeAnticipation,
+            Solver::LightAnticipation => SolverChoice::LightAnticipation,
+            Solver::AcceleratedRelaxation => SolverChoice::AcceleratedRelaxation,
+            Solver::AugmentedLagrangian => SolverChoice::AugmentedLagrangian,
+            Solver::FullAnticipation => SolverChoice::FullAnticipation,
+        });
+        let friction_cone = self.friction_cone.map_or(d.friction_cone, |cone| match cone {
+            Cone::Disc => FrictionCone::Disc,
+            Cone::Pyramid => FrictionCone::Pyramid,
+        });
+        let start_policy = self.start.map_or(d.start_policy, |start| match start {
+            Start::Refuse => StartPolicy::Refuse,
+            Start::Pass => StartPolicy::Pass,
+        });
+        Settings {
+            solver,
+            friction_cone,
+            start_policy,
+            contact_tolerance: self.contact_tolerance.unwrap_or(d.contact_tolerance),
+            velocity_tolerance: self.velocity_tolerance.unwrap_or(d.velocity_tolerance),
+            iterations_max: self.iterations_max.unwrap_or(d.iterations_max),
+            splitting_iterations: self.splitting_iterations.unwrap_or(d.splitting_iterations),
+            rounds_max: self.rounds_max.unwrap_or(d.rounds_max),
+            halvings_max: self.halvings_max.unwrap_or(d.halvings_max),
+            recovery_fraction: self.recovery_fraction.unwrap_or(d.recovery_fraction),
+            proximity_factor: self.proximity_factor.unwrap_or(d.proximity_factor),
+            turn_max: self.turn_max.unwrap_or(d.turn_max),
+            certify: true,
+        }
+    }
+}
+
+impl SettingsTable {
+    /// Errors: a number out of its range.
+    pub fn check(&self) -> Result<(), FieldFault> {
+        let at = "settings";
+        for (value, name) in [
+            (self.contact_tolerance, "contact_tolerance"),
+            (self.velocity_tolerance, "velocity_tolerance"),
+            (self.turn_max, "turn_max"),
+        ] {
+            value.map_or(Ok(()), |value| positive(value, at, name))?;
+        }
+        self.recovery_fraction.map_or(Ok(()), |value| not_negative(value, at, "recovery_fraction"))?;
+        match self.proximity_factor {
+            Some(factor) if !(factor >= 1.0 && factor.is_finite()) => {
+                Err(FieldFault::new("settings.proximity_factor", format!("finite and at least 1, not {factor}")))
+            }
+            _ => Ok(()),
+        }
+    }
+}
