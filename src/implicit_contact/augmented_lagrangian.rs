@@ -5,6 +5,7 @@
 //! `phi(dv) = dv^T A dv / 2 + sum |P(p - rho w)|^2 / (2 rho)`, with `rho = k / d`, P the projection on the limits and the
 //! friction bound frozen at the last update of the multipliers: convex and once differentiable.
 
+use super::direct_newton::DirectNewton;
 use super::friction::project_tangent;
 use super::packed_contacts::{contact_velocity, relative_velocity, world_stiffness};
 use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure};
@@ -15,8 +16,12 @@ use crate::model::FrictionCone;
 
 /// Penalty stiffness relative to the effective mass of a contact.
 const STIFFNESS: f64 = 3.0;
+/// The same where Newton systems are factored, which stiffness does not disturb.
+const STIFFNESS_FACTORED: f64 = 100.0;
 /// Newton steps between two updates of the multipliers at most.
 const NEWTON_STEPS: u32 = 3;
+/// The same where they are factored.
+const NEWTON_STEPS_FACTORED: u32 = 12;
 /// Relative residual of a Newton step's linear solve, and its steps at most.
 const LINEAR_SOLVE: (f64, u32) = (0.3, 100);
 /// Slope left at a full step, relative to the first, that calls for a line search.
@@ -45,6 +50,10 @@ struct Lagrangian<'a, 'b> {
     product: Vec<Vec3>,
     step_product: Vec<Vec3>,
     linear: GradientBuffers,
+    /// Factors Newton systems; `None` where conjugate gradients are cheaper.
+    direct: Option<DirectNewton>,
+    /// Contact of each row of the row set, if it is among the packed ones.
+    contact_of_row: Vec<Option<u32>>,
     work: Work,
 }
 
@@ -60,10 +69,16 @@ pub(super) fn run(
     let blocks = at.dv.len();
     let zeros = || vec![[0.0; 3]; blocks];
     let contacts = at.p.len();
+    let direct = DirectNewton::new(task.problem);
+    let relative = if direct.is_some() { STIFFNESS_FACTORED } else { STIFFNESS };
+    let mut contact_of_row = vec![None; task.problem.rows.len()];
+    for (c, contact) in task.packed.contacts.iter().enumerate() {
+        contact_of_row[contact.source as usize] = Some(c as u32);
+    }
     let mut l = Lagrangian {
         task,
         penalties: task.par.map_indexed(contacts, |c| {
-            penalty(task.packed.natural_scale(c, task.problem.rows, task.problem.inverse_diagonal))
+            penalty(relative, task.packed.natural_scale(c, task.problem.rows, task.problem.inverse_diagonal))
         }),
         trial: vec![[0.0; 3]; contacts],
         impulses: Vec::new(),
@@ -73,6 +88,8 @@ pub(super) fn run(
         product: zeros(),
         step_product: zeros(),
         linear: GradientBuffers::default(),
+        direct,
+        contact_of_row,
         work: Work::default(),
     };
     let run = l.iterate(at, iterations_max, buffers);
@@ -81,8 +98,8 @@ pub(super) fn run(
     run
 }
 
-fn penalty([normal, tangent]: [f64; 2]) -> Penalty {
-    let over = |d: f64| if d > 0.0 { STIFFNESS / d } else { 0.0 };
+fn penalty(relative: f64, [normal, tangent]: [f64; 2]) -> Penalty {
+    let over = |d: f64| if d > 0.0 { relative / d } else { 0.0 };
     Penalty { stiffness: [over(normal), over(tangent)], bound: 0.0 }
 }
 
@@ -96,7 +113,8 @@ impl Lagrangian<'_, '_> {
             for (penalty, (contact, p)) in self.penalties.iter_mut().zip(self.task.packed.contacts.iter().zip(&now.p)) {
                 penalty.bound = contact.friction * p[0];
             }
-            for newton in 0..NEWTON_STEPS {
+            let steps = if self.direct.is_some() { NEWTON_STEPS_FACTORED } else { NEWTON_STEPS };
+            for newton in 0..steps {
                 let change = self.evaluate(&now);
                 if newton > 0 && self.gradient_velocity() <= 2.0 * change {
                     break;
@@ -174,6 +192,17 @@ impl Lagrangian<'_, '_> {
     fn newton_step(&mut self, steps_max: u32) -> u32 {
         let Task { problem, packed, single, par, .. } = *self.task;
         let stiffness = &self.stiffness;
+        if let Some(direct) = &mut self.direct {
+            for (step, g) in self.step.iter_mut().zip(&self.gradient) {
+                *step = g.map(|x| -x);
+            }
+            let of_row = |row: usize| self.contact_of_row[row].and_then(|c| stiffness[c as usize]);
+            if direct.solve(of_row, &mut self.step) {
+                self.work.blocks += problem.matrix.values.len() as u64;
+                self.work.contacts += 2 * packed.contacts.len() as u64;
+                return 1;
+            }
+        }
         let preconditioner: Vec<Mat3> = par.map_indexed(self.gradient.len(), |b| {
             let source = &problem.inverse_diagonal[b];
             if *source == [[0.0; 3]; 3] || !packed.touches(b) {

@@ -5,6 +5,7 @@
 //! * `iterative_anticipation`: the solver of the paper
 //! * `splitting_start`: a few iterations of operator splitting before it
 //! * `augmented_lagrangian`: the fallback where rows conflict
+//! * `direct_newton`: its linear systems factored, where they are small
 //! * `full_anticipation`: the dense baseline
 //! * `block_diagonal`: the solver for lumped masses and rigid bodies alone
 //! * `packed_contacts`: contacts laid out for relaxation passes
@@ -27,6 +28,7 @@ mod augmented_lagrangian;
 mod block_diagonal;
 mod commit;
 mod constraint_set;
+mod direct_newton;
 mod double_relaxation;
 mod driven;
 mod fall_back;

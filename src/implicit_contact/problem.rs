@@ -110,6 +110,9 @@ pub fn solve(
     report
 }
 
+/// Passes over uncoupled blocks before the augmented Lagrangian has its first turn.
+const UNCOUPLED_TURN: u32 = 32;
+
 /// Runs the solver that the settings name.
 fn choose(
     task: &Task,
@@ -135,7 +138,7 @@ fn choose(
             accelerated_relaxation::run(task, coupled, at, control, buffers, work)
         }
         SolverChoice::Automatic if coupled.iter().any(|c| *c) => automatic(task, coupled, at, buffers, work, report),
-        SolverChoice::Automatic => block_diagonal::solve(task, at, max, work),
+        SolverChoice::Automatic => automatic_uncoupled(task, at, buffers, work, report),
     };
     report.iterations = run.iterations;
     report.converged = run.ending == Ending::Converged;
@@ -174,6 +177,35 @@ fn automatic(
         }
         report.hand_overs += 1;
         control = Control { patience: control.patience.saturating_mul(2), thorough: true, ..control };
+    }
+}
+
+/// Gauss-Seidel on the contacts where no system couples blocks, in turn with the augmented Lagrangian: a tall stack, or
+/// rows that share a load, take the first as many passes as it is high, and the second a few linear solves.
+fn automatic_uncoupled(
+    task: &Task,
+    at: &mut Iterate,
+    buffers: &mut MeasureBuffers,
+    work: &mut Work,
+    report: &mut SolverReport,
+) -> Run {
+    let max = task.settings.iterations_max;
+    let mut iterations = 0;
+    let mut turn = UNCOUPLED_TURN;
+    loop {
+        let run = block_diagonal::solve(task, at, turn.min(max - iterations), work);
+        iterations += run.iterations;
+        if run.ending == Ending::Converged || iterations >= max {
+            return Run { iterations, ..run };
+        }
+        report.hand_overs += 1;
+        let run = augmented_lagrangian::run(task, at, (2 * turn).min(max - iterations), buffers, work);
+        iterations += run.iterations;
+        if run.ending == Ending::Converged || iterations >= max {
+            return Run { iterations, ..run };
+        }
+        report.hand_overs += 1;
+        turn = turn.saturating_mul(2);
     }
 }
 

@@ -53,3 +53,29 @@ fn iterations_after(world: &mut World, change: impl Fn(&mut World)) -> u32 {
     (world.state, world.memory, world.velocities, world.dt) = (state, memory, velocities, dt);
     iterations
 }
+
+/// Ten blocks, a little out of line: tall for passes over the contacts, and their rows share the load.
+#[test]
+fn a_tall_stack_comes_to_rest() {
+    for seed in 0..3 {
+        let mut jitter = Jitter(seed);
+        let mut plan = Plan::rubbing(0.5);
+        let side = 0.2;
+        for level in 0..10 {
+            let z = (f64::from(level) + 0.5) * side + 2.0 * HALF_THICKNESS * f64::from(level + 1);
+            let place = [jitter.next() * 2e-4, jitter.next() * 2e-4, z + 1e-4 * jitter.next().abs()];
+            plan.rigid(&block([side; 3]), at(place), 1.0, diagonal(side * side / 6.0), [0.0; 3], [0.0; 3]);
+        }
+        plan.half_space([0.0, 0.0, 1.0], 0.0);
+        let mut world = plan.build();
+        world.gravity = [0.0, 0.0, -9.81];
+        let masses = world.masses();
+        for step in 0..100 {
+            let report = world.step();
+            assert!(!report.not_converged, "seed {seed} step {step}: {report:?}");
+            assert!(report.parts == 1 && report.rounds <= 2, "seed {seed} step {step}: {report:?}");
+        }
+        let energy = kinetic(&masses, &world.velocities) / 10.0;
+        assert!(energy < 1e-5, "seed {seed}: {energy:e} J/kg");
+    }
+}
