@@ -6,7 +6,7 @@
 //! friction bound frozen at the last update of the multipliers: convex and once differentiable.
 
 use super::direct_newton::DirectNewton;
-use super::friction::project_tangent;
+use super::friction::{project, project_tangent};
 use super::packed_contacts::{contact_velocity, relative_velocity, world_stiffness};
 use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure};
 use super::stop_test::{Ending, Run, StopTest, Verdict};
@@ -93,6 +93,10 @@ pub(super) fn run(
         work: Work::default(),
     };
     let run = l.iterate(at, iterations_max, buffers);
+    // Bounds were frozen: what is left of that, within the tolerances, goes.
+    for (p, contact) in at.p.iter_mut().zip(&task.packed.contacts) {
+        *p = project(task.settings.friction_cone, contact.friction, *p);
+    }
     work.blocks += l.work.blocks;
     work.contacts += l.work.contacts;
     run
