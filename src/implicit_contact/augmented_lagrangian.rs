@@ -22,6 +22,8 @@ const STIFFNESS_FACTORED: f64 = 100.0;
 const NEWTON_STEPS: u32 = 3;
 /// The same where they are factored.
 const NEWTON_STEPS_FACTORED: u32 = 12;
+/// Factored Newton steps go on until what they leave is this share of the contact tolerance.
+const FACTORED_SHARE: f64 = 1e-2;
 /// Relative residual of a Newton step's linear solve, and its steps at most.
 const LINEAR_SOLVE: (f64, u32) = (0.3, 100);
 /// Slope left at a full step, relative to the first, that calls for a line search.
@@ -120,7 +122,9 @@ impl Lagrangian<'_, '_> {
             let steps = if self.direct.is_some() { NEWTON_STEPS_FACTORED } else { NEWTON_STEPS };
             for newton in 0..steps {
                 let change = self.evaluate(&now);
-                if newton > 0 && self.gradient_velocity() <= 2.0 * change {
+                let exact = FACTORED_SHARE * self.task.settings.contact_tolerance * self.task.velocity_scale;
+                let enough = if self.direct.is_some() { exact } else { 2.0 * change };
+                if newton > 0 && self.gradient_velocity() <= enough {
                     break;
                 }
                 let left = iterations_max - iterations;

@@ -201,9 +201,10 @@ fn automatic_uncoupled(
         report.hand_overs += 1;
         let run = augmented_lagrangian::run(task, at, (2 * turn).min(max - iterations), buffers, work);
         iterations += run.iterations;
-        if run.ending == Ending::Converged || iterations >= max {
-            return Run { iterations, ..run };
+        if iterations >= max {
+            return Run { iterations, ending: Ending::Exhausted, error: None };
         }
+        // Converged or not: velocities follow from the impulses here, and with those the passes have the last word.
         report.hand_overs += 1;
         turn = turn.saturating_mul(2);
     }
