@@ -9,7 +9,7 @@ pub type Places<const N: usize> = [[u32; N]; N];
 /// Block pattern of a body over its nodes, and where every energy adds. Depends on the topology alone: made once.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pattern {
-    /// The matrix without values.
+    /// The matrix, of zeros.
     pub matrix: BlockMatrix,
     /// The envelope of its direct factor.
     pub envelope: Envelope,
@@ -28,23 +28,14 @@ pub struct Pattern {
 impl Pattern {
     /// The pattern of `forces` over `count` nodes. Node numbers in range ([`Forces::fault`]). Cost: a sort of the pairs.
     pub fn new(forces: &Forces, count: usize) -> Pattern {
-        let mut pairs: Vec<(u32, u32)> = (0..count as u32).map(|i| (i, i)).collect();
+        let mut pairs: Vec<(u32, u32)> = Vec::new();
         add_pairs(&forces.springs.nodes, &mut pairs);
         add_pairs(&forces.membranes.nodes, &mut pairs);
         add_pairs(&forces.hinges.nodes, &mut pairs);
         add_pairs(&forces.tetrahedra.nodes, &mut pairs);
         add_pairs(&forces.drag_faces, &mut pairs);
-        pairs.sort_unstable();
-        pairs.dedup();
-        let mut row_offsets = vec![0; count + 1];
-        pairs.iter().for_each(|p| row_offsets[p.0 as usize + 1] += 1);
-        for i in 0..count {
-            row_offsets[i + 1] += row_offsets[i];
-        }
-        let columns: Vec<u32> = pairs.iter().map(|p| p.1).collect();
-        let matrix = BlockMatrix { row_offsets, columns, ..BlockMatrix::default() };
+        let matrix = BlockMatrix::from_places(count, pairs);
         let mut pattern = Pattern { matrix, ..Pattern::default() };
-        pattern.matrix.diagonal = (0..count as u32).map(|i| pattern.place(i, i) as usize).collect();
         pattern.envelope = Envelope::new(&pattern.matrix);
         pattern.springs = pattern.places(&forces.springs);
         pattern.membranes = pattern.places(&forces.membranes);
@@ -54,15 +45,8 @@ impl Pattern {
         pattern
     }
 
-    fn place(&self, row: u32, column: u32) -> u32 {
-        let BlockMatrix { row_offsets, columns, .. } = &self.matrix;
-        let slots = row_offsets[row as usize]..row_offsets[row as usize + 1];
-        let within = columns[slots.clone()].partition_point(|c| *c < column);
-        (slots.start + within) as u32
-    }
-
     fn places_of<const N: usize>(&self, nodes: &[u32; N]) -> Places<N> {
-        nodes.map(|row| nodes.map(|column| self.place(row, column)))
+        nodes.map(|row| nodes.map(|column| self.matrix.place(row, column) as u32))
     }
 
     fn places<S: Stencil<N>, const N: usize>(&self, elements: &Elements<S, N>) -> Vec<Places<N>> {

@@ -27,6 +27,33 @@ impl BlockMatrix {
         }
     }
 
+    /// A matrix of zeros whose pattern holds the diagonal and the given places, which hold the mirror of each.
+    ///
+    /// Cost: a sort of the pairs.
+    pub fn from_places(rows: usize, mut places: Vec<(u32, u32)>) -> BlockMatrix {
+        places.extend((0..rows as u32).map(|i| (i, i)));
+        places.sort_unstable();
+        places.dedup();
+        let mut matrix = BlockMatrix { row_offsets: vec![0; rows + 1], ..BlockMatrix::default() };
+        for (row, column) in &places {
+            if row == column {
+                matrix.diagonal.push(matrix.columns.len());
+            }
+            matrix.columns.push(*column);
+            matrix.row_offsets[*row as usize + 1] = matrix.columns.len();
+        }
+        matrix.values = vec![[[0.0; 3]; 3]; matrix.columns.len()];
+        matrix
+    }
+
+    /// Where block `(row, column)`, which the pattern holds, stands in `values`. Cost: logarithmic in the row.
+    #[inline]
+    pub fn place(&self, row: u32, column: u32) -> usize {
+        let start = self.row_offsets[row as usize];
+        let columns = &self.columns[start..self.row_offsets[row as usize + 1]];
+        start + columns.partition_point(|c| *c < column)
+    }
+
     /// Number of block rows.
     pub fn rows(&self) -> usize {
         self.diagonal.len()

@@ -168,7 +168,8 @@ fn infeasible_rows_end_at_the_cap_with_finite_numbers() {
 #[test]
 fn warm_starts_are_used() {
     for choice in [SolverChoice::Automatic, SolverChoice::AugmentedLagrangian, SolverChoice::LightAnticipation] {
-        let made = folded_sheet(16, 100.0, &mut Random::new(8));
+        // Large enough that the augmented Lagrangian does not factor it.
+        let made = folded_sheet(32, 100.0, &mut Random::new(8));
         let settings =
             Settings { solver: choice, iterations_max: 20_000, velocity_tolerance: 1e-3, ..Settings::default() };
         let (mut p, mut dv, cold) = made.solve(&settings);
@@ -176,9 +177,7 @@ fn warm_starts_are_used() {
             *v *= 1.001;
         }
         let warm = solve(&made.view(), &mut p, &mut dv, &settings, &mut SolverScratch::default(), Par::Serial);
-        // The augmented Lagrangian factors a problem of this size: a dozen steps suffice to start with.
-        let saved = if choice == SolverChoice::AugmentedLagrangian { 1 } else { 2 };
-        assert!(warm.converged && warm.iterations * saved < cold.iterations, "{choice:?}: {cold:?} {warm:?}");
+        assert!(warm.converged && warm.iterations * 2 < cold.iterations, "{choice:?}: {cold:?} {warm:?}");
     }
 }
 
