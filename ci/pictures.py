@@ -180,9 +180,9 @@ def sheet(scenes, out, arguments, height_of_floor):
 def draw_run(run, arguments):
     """The sheet and the plots of a run's folder."""
     report = json.loads((run / "report.json").read_text())
-    frames = sorted((run / "frames").glob("frame_*.obj"))
+    frames = sorted((run / arguments.folder).glob("frame_*.obj"))
     if not frames:
-        raise SystemExit(f"{run}: no frames")
+        raise SystemExit(f"{run / arguments.folder}: no frames")
     chosen = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, arguments.count).round().astype(int))]
     scenes = [read_obj(frame) for frame in chosen]
     if report["up"] == "z":
@@ -233,14 +233,17 @@ def main():
     parser.add_argument("out", type=pathlib.Path, help="the picture, or the folder of a run")
     parser.add_argument("frames", nargs="*")
     parser.add_argument("--count", type=int, default=6, help="frames of a run to draw")
+    parser.add_argument("--folder", default="frames", help="frames of a run to draw: frames or subdivided")
     parser.add_argument("--columns", type=int, default=3)
     parser.add_argument("--size", default="640x480", help="of one picture, in pixels")
     parser.add_argument("--camera", type=vector, help="where the camera stands; default: a three-quarter view of all")
     parser.add_argument("--look-at", type=vector)
-    parser.add_argument("--zoom", type=float, default=1.0)
+    parser.add_argument("--zoom", type=float, help="default: 1, and 0.8 for a run, whose bodies fly and fall")
     parser.add_argument("--follow", action="store_true", help="move the camera with the middle of what is drawn")
     parser.add_argument("--floor", action="store_true", help="draw a floor at y = 0")
     arguments = parser.parse_args()
+    if arguments.zoom is None:
+        arguments.zoom = 0.8 if arguments.out.is_dir() else 1.0
 
     if arguments.out.is_dir():
         draw_run(arguments.out, arguments)

@@ -1,9 +1,10 @@
 //! A world from a scene file.
 
+use super::cage::cage;
 use super::energy::Energies;
 use super::fault::FieldFault;
 use super::file::{Contact, KinematicTable, Pin, RigidTable, SceneFile, SheetTable, SolidTable};
-use super::mesh_source::SourceMesh;
+use super::mesh_source::{MeshSource, SourceMesh};
 use super::motion::{Frames, Twist, moved, shifted};
 use super::placement::{Copies, Placement, Sequence};
 use crate::energy::{Damping, SheetMaterial, SolidMaterial};
@@ -25,7 +26,16 @@ pub struct SceneBody {
     /// Triangles of its surface, for frames.
     pub triangles: Vec<[u32; 3]>,
     pub energies: Energies,
+    /// What it has for contact.
+    pub options: BodyOptions,
     script: Script,
+}
+
+impl SceneBody {
+    /// Whether it is a sheet or a solid.
+    pub fn deforms(&self) -> bool {
+        matches!(self.energies, Energies::Nodes { .. })
+    }
 }
 
 /// What drives a body from step to step.
@@ -34,7 +44,13 @@ enum Script {
     /// Pinned nodes, their start positions, and how they move.
     Pins(Vec<PinGroup>),
     Pose(Pose, Vec<Twist>),
-    Frames(Frames, Pose),
+    /// Frames at their placement, carried along by a motion of its start pose.
+    Frames {
+        frames: Frames,
+        placed: Pose,
+        centre: Pose,
+        motion: Vec<Twist>,
+    },
     Plane(HalfSpace, Vec<Twist>),
 }
 
@@ -45,22 +61,34 @@ struct PinGroup {
     follow: Option<Follow>,
 }
 
-/// The body that pins follow, and of each pin the nearest vertex of it.
+/// The body that pins follow: its motion as a whole, and the mean way of its vertices near each pin.
 struct Follow {
     body: usize,
-    vertices: Vec<u32>,
+    /// Of each pin: vertices of the body with their shares.
+    near: Vec<Vec<(u32, f64)>>,
 }
 
 impl Follow {
-    /// Errors: there is no such body.
-    fn new(scene: &Scene, name: &str, nodes: &[(u32, Vec3)]) -> Option<Follow> {
+    /// Vertices within a distance of each pin at the start, the nearer the more; where there are none, the nearest.
+    ///
+    /// Errors: there is no such body, or it has no vertices. Cost: pins times vertices.
+    fn new(scene: &Scene, name: &str, nodes: &[(u32, Vec3)], within: f64) -> Option<Follow> {
         let body = scene.bodies.iter().position(|body| body.name == name)?;
         let positions = scene.world.positions(scene.bodies[body].id).ok()?;
-        let nearest = |x: Vec3| {
-            let distance = |v: &u32| norm(sub(positions[*v as usize], x));
-            (0..positions.len() as u32).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        let near = |x: Vec3| {
+            let distances: Vec<f64> = positions.iter().map(|p| norm(sub(*p, x))).collect();
+            let share = |d: f64| (1.0 - (d / within).powi(2)).powi(2);
+            let mut near: Vec<(u32, f64)> =
+                (0..).zip(&distances).filter(|(_, d)| **d < within).map(|(v, d)| (v, share(*d))).collect();
+            let total: f64 = near.iter().map(|(_, share)| share).sum();
+            near.iter_mut().for_each(|(_, share)| *share /= total);
+            if near.is_empty() {
+                let nearest = (0..distances.len()).min_by(|a, b| distances[*a].total_cmp(&distances[*b]))?;
+                near.push((nearest as u32, 1.0));
+            }
+            Some(near)
         };
-        Some(Follow { body, vertices: nodes.iter().map(|(_, x)| nearest(*x)).collect::<Option<_>>()? })
+        Some(Follow { body, near: nodes.iter().map(|(_, x)| near(*x)).collect::<Option<_>>()? })
     }
 }
 
@@ -92,13 +120,19 @@ impl Scene {
             builder.kinematic(table, &format!("kinematic[{i}]"))?;
         }
         for (i, table) in file.sheet.iter().enumerate() {
-            builder.sheets(table, &format!("sheet[{i}]"))?;
+            for table in table.variants() {
+                builder.sheets(&table, &format!("sheet[{i}]"))?;
+            }
         }
         for (i, table) in file.solid.iter().enumerate() {
-            builder.solids(table, &format!("solid[{i}]"))?;
+            for table in table.variants() {
+                builder.solids(&table, &format!("solid[{i}]"))?;
+            }
         }
         for (i, table) in file.rigid.iter().enumerate() {
-            builder.rigid(table, &format!("rigid[{i}]"))?;
+            for table in table.variants() {
+                builder.rigid(&table, &format!("rigid[{i}]"))?;
+            }
         }
         for (i, table) in file.half_space.iter().enumerate() {
             let at = format!("half_space[{i}]");
@@ -107,7 +141,15 @@ impl Scene {
             let plane = HalfSpace { normal: scale(1.0 / length, table.normal), offset: table.offset / length };
             let id = builder.scene.world.add_half_space(options, plane).map_err(|e| refused(&at, &e))?;
             let script = Script::Plane(plane, table.motion.clone());
-            builder.add(id, table.name.clone(), Vec::new(), Energies::None, script)?;
+            let body = SceneBody {
+                id,
+                name: table.name.clone(),
+                triangles: Vec::new(),
+                energies: Energies::None,
+                options,
+                script,
+            };
+            builder.add(body);
         }
         Ok(builder.scene)
     }
@@ -121,10 +163,14 @@ impl Scene {
                     let mut targets = self.world.node_positions(body.id)?.to_vec();
                     for group in groups {
                         if let Some(follow) = &group.follow {
-                            let (from, to) = (self.scripted(follow.body, 0.0)?, self.scripted(follow.body, t)?);
-                            for ((node, x), v) in group.nodes.iter().zip(&follow.vertices) {
-                                let way = sub(to[*v as usize], from[*v as usize]);
-                                targets[*node as usize] = add(*x, way);
+                            let ways = self.scripted_ways(follow.body, t);
+                            let (start, end) = self.scripted_pose(follow.body, t);
+                            for ((node, x), near) in group.nodes.iter().zip(&follow.near) {
+                                let way = near.iter().map(|(v, share)| (ways.get(*v as usize), share));
+                                let way = way.fold([0.0; 3], |sum, (way, share)| {
+                                    add_scaled(sum, *share, way.copied().unwrap_or_default())
+                                });
+                                targets[*node as usize] = end.transform(sub(add(*x, way), start.position));
                             }
                             continue;
                         }
@@ -137,7 +183,14 @@ impl Scene {
                     self.world.push_target_positions(body.id, targets)?;
                 }
                 Script::Pose(start, motion) => self.world.push_target_pose(body.id, moved(*start, motion, t))?,
-                Script::Frames(frames, pose) => self.world.push_target_positions(body.id, frames.at(t, pose))?,
+                Script::Frames { frames, placed, centre, motion } => {
+                    let pose = moved(*centre, motion, t);
+                    let mut targets = frames.at(t, placed);
+                    if pose != *centre {
+                        targets.iter_mut().for_each(|x| *x = pose.transform(sub(*x, centre.position)));
+                    }
+                    self.world.push_target_positions(body.id, targets)?;
+                }
                 Script::Plane(plane, motion) => {
                     let offset = plane.offset + dot(plane.normal, shifted(motion, t));
                     self.world.push_target_half_space(body.id, HalfSpace { offset, ..*plane })?;
@@ -149,17 +202,20 @@ impl Scene {
 }
 
 impl Scene {
-    /// Where the vertices of a scripted body are at time `t`.
-    fn scripted(&self, body: usize, t: f64) -> Result<Vec<Vec3>, WorldError> {
-        let body = &self.bodies[body];
-        match &body.script {
-            Script::Frames(frames, pose) => Ok(frames.at(t, pose)),
-            Script::Pose(start, motion) => {
-                let pose = moved(*start, motion, t);
-                Ok(self.world.surface(body.id)?.rest.iter().map(|x| pose.transform(*x)).collect())
-            }
-            _ => Ok(self.world.positions(body.id)?.to_vec()),
+    /// Where the centre of a scripted body's motion as a whole is at the start, and its pose at time `t`.
+    fn scripted_pose(&self, body: usize, t: f64) -> (Pose, Pose) {
+        match &self.bodies[body].script {
+            Script::Frames { centre, motion, .. } => (*centre, moved(*centre, motion, t)),
+            Script::Pose(start, motion) => (*start, moved(*start, motion, t)),
+            _ => (Pose::IDENTITY, Pose::IDENTITY),
         }
+    }
+
+    /// How far the frames of a scripted body have moved its vertices at time `t`, without its motion as a whole; nothing
+    /// for a body without frames.
+    fn scripted_ways(&self, body: usize, t: f64) -> Vec<Vec3> {
+        let Script::Frames { frames, placed, .. } = &self.bodies[body].script else { return Vec::new() };
+        frames.at(t, placed).iter().zip(frames.at(0.0, placed)).map(|(to, from)| sub(*to, from)).collect()
     }
 }
 
@@ -224,15 +280,23 @@ impl Builder<'_> {
             };
             let id = self.scene.world.add_sheet(description).map_err(|e| refused(at, &e))?;
             let energies = Energies::Nodes { masses: masses.clone(), forces: forces.clone() };
-            self.add(id, name, mesh.triangles.clone(), energies, script)?;
+            self.add(SceneBody { id, name, triangles: mesh.triangles.clone(), energies, options, script });
         }
         Ok(())
     }
 
     fn solids(&mut self, table: &SolidTable, at: &str) -> Result<(), FieldFault> {
-        let mesh = self.scaled_mesh(&table.mesh, &table.placement, &format!("{at}.mesh"))?;
+        let surface = match &table.surface {
+            Some(source) => Some(self.scaled_mesh(source, &table.placement, &format!("{at}.surface"))?),
+            None => None,
+        };
+        let mesh = match (&table.mesh, &surface) {
+            (MeshSource::Cage { cell }, Some(surface)) => cage(surface, scale(table.placement.scale, *cell))
+                .map_err(|message| FieldFault::new(format!("{at}.mesh.cage"), message))?,
+            (source, _) => self.scaled_mesh(source, &table.placement, &format!("{at}.mesh"))?,
+        };
         if mesh.tetrahedra.is_empty() {
-            let message = "a solid needs tetrahedra: box_tetrahedra, cylinder_tetrahedra or gmsh";
+            let message = "a solid needs tetrahedra: box_tetrahedra, cylinder_tetrahedra, cage or gmsh";
             return Err(FieldFault::new(format!("{at}.mesh"), message));
         }
         let m = &table.material;
@@ -249,10 +313,6 @@ impl Builder<'_> {
         let masses = tets.lumped_masses(material.density);
         let forces = material.solid(&tets).map_err(|f| FieldFault::new(at, format!("{} ({}, {})", f.0, f.1, f.2)))?;
         let forces = std::sync::Arc::new(forces);
-        let surface = match &table.surface {
-            Some(source) => Some(self.scaled_mesh(source, &table.placement, &format!("{at}.surface"))?),
-            None => None,
-        };
         let faces = match &surface {
             Some(surface) => surface.triangles.clone(),
             None => tets.boundary().map_err(of_mesh)?,
@@ -281,7 +341,7 @@ impl Builder<'_> {
             let id = self.scene.world.add_solid(description).map_err(|e| refused(at, &e))?;
             let energies = Energies::Nodes { masses: masses.clone(), forces: forces.clone() };
             self.scene.tetrahedra += mesh.tetrahedra.len();
-            self.add(id, name, faces.clone(), energies, script)?;
+            self.add(SceneBody { id, name, triangles: faces.clone(), energies, options, script });
         }
         Ok(())
     }
@@ -310,7 +370,8 @@ impl Builder<'_> {
             };
             let id = self.scene.world.add_rigid(description).map_err(|e| refused(at, &e))?;
             let energies = Energies::Rigid { mass: mass.mass, inertia: mass.inertia };
-            self.add(id, name, mesh.triangles.clone(), energies, Script::Free)?;
+            let triangles = mesh.triangles.clone();
+            self.add(SceneBody { id, name, triangles, energies, options, script: Script::Free });
         }
         Ok(())
     }
@@ -320,42 +381,33 @@ impl Builder<'_> {
         let options = self.options(&table.contact(), at)?;
         let placed = table.placement.pose();
         let topology = Topology { triangles: mesh.triangles.clone(), ..Topology::default() };
+        let centre = table.centre.unwrap_or(placed.position);
+        let start = Pose { position: centre, ..Pose::IDENTITY };
+        let motion = table.motion.clone();
         let (description, script) = if let Some(frames) = &table.frames {
             let frames = Frames::read(frames, self.folder, mesh.positions.len(), &format!("{at}.frames"))?
                 .scaled(table.placement.scale);
             let vertices = frames.at(0.0, &placed);
-            (KinematicDescription { options, vertices, topology, pose: None }, Script::Frames(frames, placed))
+            let description = KinematicDescription { options, vertices, topology, pose: None };
+            (description, Script::Frames { frames, placed, centre: start, motion })
         } else {
             // The body frame has its origin at the centre of turns and the axes of the world.
-            let centre = table.centre.unwrap_or(placed.position);
             let vertices = mesh.positions.iter().map(|x| sub(placed.transform(*x), centre)).collect();
-            let start = Pose { position: centre, ..Pose::IDENTITY };
             let description = KinematicDescription { options, vertices, topology, pose: Some(start) };
-            (description, Script::Pose(start, table.motion.clone()))
+            (description, Script::Pose(start, motion))
         };
         let id = self.scene.world.add_kinematic(description).map_err(|e| refused(at, &e))?;
-        self.add(id, table.name.clone(), mesh.triangles, Energies::None, script)
-    }
-
-    fn add(
-        &mut self,
-        id: u64,
-        name: String,
-        triangles: Vec<[u32; 3]>,
-        energies: Energies,
-        script: Script,
-    ) -> Result<(), FieldFault> {
-        self.scene.vertices += self.scene.world.positions(id).map_or(0, <[Vec3]>::len);
-        self.scene.bodies.push(SceneBody { id, name, triangles, energies, script });
+        let (name, triangles) = (table.name.clone(), mesh.triangles);
+        self.add(SceneBody { id, name, triangles, energies: Energies::None, options, script });
         Ok(())
     }
 
-    fn scaled_mesh(
-        &self,
-        source: &super::mesh_source::MeshSource,
-        placement: &Placement,
-        at: &str,
-    ) -> Result<SourceMesh, FieldFault> {
+    fn add(&mut self, body: SceneBody) {
+        self.scene.vertices += self.scene.world.positions(body.id).map_or(0, <[Vec3]>::len);
+        self.scene.bodies.push(body);
+    }
+
+    fn scaled_mesh(&self, source: &MeshSource, placement: &Placement, at: &str) -> Result<SourceMesh, FieldFault> {
         let mut mesh = source.mesh(self.folder, at)?;
         mesh.positions.iter_mut().for_each(|x| *x = scale(placement.scale, *x));
         Ok(mesh)
@@ -446,9 +498,11 @@ fn nodes(
         let nodes: Vec<(u32, Vec3)> = found.iter().map(|v| (*v, positions[*v as usize])).collect();
         let follow = match &pin.follow {
             None => None,
-            Some(name) => Some(Follow::new(scene, name, &nodes).ok_or_else(|| {
-                FieldFault::new(format!("{at}.pins[{i}].follow"), format!("the body '{name}' has no vertices"))
-            })?),
+            Some(name) => {
+                Some(Follow::new(scene, name, &nodes, pin.follow_within.unwrap_or(0.0)).ok_or_else(|| {
+                    FieldFault::new(format!("{at}.pins[{i}].follow"), format!("the body '{name}' has no vertices"))
+                })?)
+            }
         };
         let start = Pose { position: centre, ..Pose::IDENTITY };
         groups.push(PinGroup { nodes, start, motion: pin.motion.clone(), follow });

@@ -268,7 +268,7 @@ body_table!(
         centre: Option<Vec3>,
         #[serde(default)]
         motion: Vec<Twist>,
-        /// Positions of the vertices from a file, instead of a motion.
+        /// Positions of the vertices from a file; a motion carries them along.
         frames: Option<FramesTable>,
     }
 );
@@ -298,8 +298,11 @@ pub struct Pin {
     pub centre: Option<Vec3>,
     #[serde(default)]
     pub motion: Vec<Twist>,
-    /// Name of a kinematic body: each pinned vertex keeps its distance to the body's vertex that is nearest at the start.
+    /// Name of a kinematic body: pinned vertices follow its motion, and of its frames the way of the nearest vertex.
     pub follow: Option<String>,
+    /// With a body to follow: instead of the nearest vertex's, the mean way of all within this distance at the start
+    /// `[m]`, the nearer the more. Pins of layers over each other stay in order so.
+    pub follow_within: Option<f64>,
 }
 
 /// Material of a sheet.
@@ -444,6 +447,36 @@ impl SceneFile {
     }
 }
 
+/// A table for each word of its copies' variants: with the word in its files' names and at its own slots.
+macro_rules! variants {
+    ($name:ident $(, $more:ident)?) => {
+        impl $name {
+            /// The table itself, or one for each of its copies' variants.
+            pub fn variants(&self) -> Vec<$name> {
+                let words = self.copies.as_ref().map_or(&[][..], |copies| &copies.variants);
+                if words.is_empty() {
+                    return vec![self.clone()];
+                }
+                let of = |(index, word): (usize, &String)| {
+                    let copies = self.copies.clone();
+                    $name {
+                        name: format!("{}_{word}", self.name),
+                        mesh: self.mesh.with_word(word),
+                        copies: copies.map(|copies| Copies { variant: Some((index, words.len())), ..copies }),
+                        $($more: self.$more.as_ref().map(|source| source.with_word(word)),)?
+                        ..self.clone()
+                    }
+                };
+                words.iter().enumerate().map(of).collect()
+            }
+        }
+    };
+}
+
+variants!(SheetTable);
+variants!(RigidTable);
+variants!(SolidTable, surface);
+
 impl SheetTable {
     fn check(&self, at: &str) -> Result<(), FieldFault> {
         self.check_contact(at)?;
@@ -513,9 +546,6 @@ impl KinematicTable {
         self.placement.check(&format!("{at}.placement"))?;
         check_motion(&format!("{at}.motion"), &self.motion)?;
         if let Some(frames) = &self.frames {
-            if !self.motion.is_empty() {
-                return Err(FieldFault::new(format!("{at}.frames"), "a body has a motion or frames, not both"));
-            }
             positive(frames.seconds_per_frame, &format!("{at}.frames"), "seconds_per_frame")?;
         }
         Ok(())
@@ -554,6 +584,9 @@ fn check_pins(at: &str, pins: &[Pin]) -> Result<(), FieldFault> {
             return Err(FieldFault::new(format!("{at}.pins[{i}]"), "a pin names vertices or a box: vertices, within"));
         }
         check_motion(&format!("{at}.pins[{i}].motion"), &pin.motion)?;
+        if let Some(within) = pin.follow_within {
+            positive(within, &format!("{at}.pins[{i}]"), "follow_within")?;
+        }
         if pin.follow.is_some() && !pin.motion.is_empty() {
             return Err(FieldFault::new(format!("{at}.pins[{i}].follow"), "a pin has a motion or a body to follow"));
         }

@@ -33,6 +33,10 @@ pub enum MeshSource {
     CylinderTetrahedra { cells: [usize; 2], radius: f64, height: f64 },
     /// Tetrahedra of a Gmsh file, version 2.2, text.
     Gmsh { file: String },
+    /// Coarse tetrahedra around the surface that a solid carries, in cells of at most this size.
+    Cage { cell: Vec3 },
+    /// A part of a ring about the y axis, `degrees` wide around +x: `radius` to the middle of its thickness.
+    Voussoir { radius: f64, thickness: f64, degrees: f64, depth: f64 },
 }
 
 /// A mesh: triangles or tetrahedra.
@@ -77,6 +81,18 @@ impl MeshSource {
                 let counts = cells.map(|c| ("cells", c)).to_vec();
                 ("cylinder_tetrahedra", vec![("radius", *radius), ("height", *height)], counts)
             }
+            MeshSource::Cage { cell } => ("cage", cell.map(|c| ("cell", c)).to_vec(), vec![]),
+            MeshSource::Voussoir { radius, thickness, degrees, depth } => {
+                let lengths = vec![
+                    ("radius", *radius),
+                    ("thickness", *thickness),
+                    ("thickness", 2.0 * radius - thickness),
+                    ("degrees", *degrees),
+                    ("degrees", 180.0 - degrees),
+                    ("depth", *depth),
+                ];
+                ("voussoir", lengths, vec![])
+            }
             MeshSource::Obj { .. } | MeshSource::Gmsh { .. } => return Ok(()),
         };
         let at = format!("{at}.{kind}");
@@ -120,6 +136,31 @@ impl MeshSource {
                 Ok(cylinder_tetrahedra(*cells, *radius, *height))
             }
             MeshSource::Gmsh { file } => read(folder, file, &format!("{at}.gmsh.file"), parse_gmsh),
+            MeshSource::Cage { .. } => Err(FieldFault::new(
+                format!("{at}.cage"),
+                "a cage goes around the surface of a solid, and there is none",
+            )),
+            MeshSource::Voussoir { radius, thickness, degrees, depth } => {
+                let (inner, outer) = (radius - 0.5 * thickness, radius + 0.5 * thickness);
+                let place = |u: Vec3| {
+                    let (s, c) = ((u[0] - 0.5) * degrees).to_radians().sin_cos();
+                    let r = inner + u[2] * (outer - inner);
+                    [r * c, (u[1] - 0.5) * depth, -r * s]
+                };
+                let solid = lattice([1, 1, 1], place);
+                let boundary = TetMesh::new(solid.positions.clone(), solid.tetrahedra).and_then(|mesh| mesh.boundary());
+                let boundary = boundary.map_err(|e| FieldFault::new(format!("{at}.voussoir"), e.to_string()))?;
+                Ok(triangles(solid.positions, boundary))
+            }
+        }
+    }
+
+    /// The source with `word` in the place of `*` in its file's name.
+    pub fn with_word(&self, word: &str) -> MeshSource {
+        match self {
+            MeshSource::Obj { file } => MeshSource::Obj { file: file.replace('*', word) },
+            MeshSource::Gmsh { file } => MeshSource::Gmsh { file: file.replace('*', word) },
+            other => other.clone(),
         }
     }
 }
@@ -205,7 +246,7 @@ fn kuhn(cells: [usize; 3], at: impl Fn([usize; 3]) -> u32, positions: &[Vec3]) -
 }
 
 /// Vertices of a lattice of cells, each placed by `f` of its three fractions.
-fn lattice(cells: [usize; 3], f: impl Fn(Vec3) -> Vec3) -> SourceMesh {
+pub fn lattice(cells: [usize; 3], f: impl Fn(Vec3) -> Vec3) -> SourceMesh {
     let mut positions = Vec::new();
     for i in 0..=cells[0] {
         for j in 0..=cells[1] {
@@ -235,21 +276,22 @@ fn cylinder_tetrahedra(cells: [usize; 2], radius: f64, height: f64) -> SourceMes
 }
 
 fn without_loose_vertices(positions: Vec<Vec3>, mut faces: Vec<[u32; 3]>) -> SourceMesh {
-    let mut used = vec![false; positions.len()];
-    faces.iter().flatten().for_each(|v| used[*v as usize] = true);
-    let mut kept = Vec::new();
-    let place: Vec<u32> = positions
-        .iter()
-        .zip(&used)
-        .map(|(x, used)| {
-            if *used {
-                kept.push(*x);
-            }
-            kept.len().saturating_sub(1) as u32
-        })
-        .collect();
-    faces.iter_mut().flatten().for_each(|v| *v = place[*v as usize]);
+    let kept = used(&positions, faces.iter_mut().flatten());
     triangles(kept, faces)
+}
+
+/// The positions that corners name, in their order; the corners are numbered anew.
+pub fn used<'a>(positions: &[Vec3], corners: impl Iterator<Item = &'a mut u32>) -> Vec<Vec3> {
+    let corners: Vec<&mut u32> = corners.collect();
+    let mut place = vec![u32::MAX; positions.len()];
+    corners.iter().for_each(|v| place[**v as usize] = 0);
+    let mut kept = Vec::new();
+    for (x, place) in positions.iter().zip(&mut place).filter(|(_, place)| **place == 0) {
+        *place = kept.len() as u32;
+        kept.push(*x);
+    }
+    corners.into_iter().for_each(|v| *v = place[*v as usize]);
+    kept
 }
 
 type Parser = fn(&str) -> Result<SourceMesh, (usize, String)>;

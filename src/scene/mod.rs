@@ -5,16 +5,19 @@
 //! * `settings`: the table of settings
 //! * `placement`: where bodies and their copies stand
 //! * `mesh_source`: meshes from formulas and files
+//! * `cage`: coarse tetrahedra around a surface
 //! * `motion`: prescribed motion
 //! * `build`: a world from a scene file
 //! * `energy`: kinetic and elastic energy of its bodies
 //! * `frames`: OBJ frames
+//! * `subdivide`: finer frames
 //! * `usd`: the animated cache
 //! * `statistics`: a row per step, and what the rows come to
 //! * `report`: the final line
 //! * `run`: the loop
 
 mod build;
+mod cage;
 mod energy;
 mod fault;
 mod file;
@@ -26,6 +29,7 @@ mod report;
 mod run;
 mod settings;
 mod statistics;
+mod subdivide;
 mod usd;
 
 pub use fault::SceneFault;

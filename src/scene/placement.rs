@@ -54,6 +54,14 @@ pub struct Copies {
     pub slots: Slots,
     /// Turns by random angles drawn from this seed; without: none.
     pub turns_seed: Option<u64>,
+    /// How much farther than the slot before each is turned about the placement.
+    pub turn: Option<Turn>,
+    /// Words that take the place of `*` in the names of the mesh files, slot after slot in their order, over and over.
+    #[serde(default)]
+    pub variants: Vec<String>,
+    /// Of how many variants these are the copies of which.
+    #[serde(skip)]
+    pub variant: Option<(usize, usize)>,
 }
 
 fn xyz() -> [usize; 3] {
@@ -70,27 +78,36 @@ pub enum Slots {
     Odd,
 }
 
+impl Turn {
+    fn check(&self, at: &str) -> Result<(), FieldFault> {
+        finite(self.axis, at, "axis")?;
+        finite([self.degrees, 0.0, 0.0], at, "degrees")?;
+        if norm(self.axis) == 0.0 {
+            return Err(FieldFault::new(format!("{at}.axis"), "an axis is not zero"));
+        }
+        Ok(())
+    }
+
+    /// The pose after it has been turned so many times.
+    fn of(&self, pose: &Pose, times: f64) -> Pose {
+        let rate = times * self.degrees.to_radians() / norm(self.axis);
+        pose.advanced([0.0; 3], scale(rate, self.axis), 1.0)
+    }
+}
+
 impl Placement {
     pub fn check(&self, at: &str) -> Result<(), FieldFault> {
         finite(self.position, at, "position")?;
         positive(self.scale, at, "scale")?;
         for (i, turn) in self.rotation.iter().enumerate() {
-            let at = format!("{at}.rotation[{i}]");
-            finite(turn.axis, &at, "axis")?;
-            finite([turn.degrees, 0.0, 0.0], &at, "degrees")?;
-            if norm(turn.axis) == 0.0 {
-                return Err(FieldFault::new(format!("{at}.axis"), "an axis is not zero"));
-            }
+            turn.check(&format!("{at}.rotation[{i}]"))?;
         }
         Ok(())
     }
 
     /// Position and turn, without the scale.
     pub fn pose(&self) -> Pose {
-        let turned = self.rotation.iter().fold(Pose::IDENTITY, |pose, turn| {
-            let rate = turn.degrees.to_radians() / norm(turn.axis);
-            pose.advanced([0.0; 3], scale(rate, turn.axis), 1.0)
-        });
+        let turned = self.rotation.iter().fold(Pose::IDENTITY, |pose, turn| turn.of(&pose, 1.0));
         Pose { position: self.position, ..turned }
     }
 }
@@ -103,6 +120,9 @@ impl Copies {
         }
         if let Some(i) = self.grid.iter().position(|side| *side == 0) {
             return Err(FieldFault::new(format!("{at}.grid[{i}]"), "at least one slot each way"));
+        }
+        if let Some(turn) = &self.turn {
+            turn.check(&format!("{at}.turn"))?;
         }
         let mut axes = self.axes;
         axes.sort_unstable();
@@ -119,7 +139,8 @@ impl Copies {
             let [columns, rows] = self.grid;
             let place = [slot % columns, slot / columns % rows, slot / (columns * rows)];
             let even = place.iter().sum::<usize>() % 2 == 0;
-            if (self.slots == Slots::Even && !even) || (self.slots == Slots::Odd && even) {
+            let other = self.variant.is_some_and(|(which, of)| slot % of != which);
+            if other || (self.slots == Slots::Even && !even) || (self.slots == Slots::Odd && even) {
                 continue;
             }
             let middle = [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0), 0.0];
@@ -127,11 +148,12 @@ impl Copies {
             for k in 0..3 {
                 shift[self.axes[k]] = self.spacing[self.axes[k]] * (place[k] as f64 - middle[k]);
             }
-            let orientation = self.turns_seed.map_or(pose.orientation, |seed| {
-                let mut random = Sequence::new(seed, slot as u64);
-                random.turn()
-            });
-            out.push(Pose { position: add(pose.position, shift), orientation });
+            let start = match self.turns_seed {
+                None => *pose,
+                Some(seed) => Pose { orientation: Sequence::new(seed, slot as u64).turn(), ..*pose },
+            };
+            let turned = self.turn.as_ref().map_or(start, |turn| turn.of(&start, slot as f64));
+            out.push(Pose { position: add(pose.position, shift), ..turned });
         }
         out
     }
@@ -203,6 +225,9 @@ mod tests {
             axes: xyz(),
             slots,
             turns_seed,
+            turn: None,
+            variants: Vec::new(),
+            variant: None,
         };
         let at = |slots| copies(slots, None).poses(&Pose::IDENTITY).iter().map(|p| p.position).collect::<Vec<_>>();
         assert_eq!(at(Slots::All)[6], [-0.5, 1.0, 3.0]);
@@ -211,5 +236,17 @@ mod tests {
         let turned = copies(Slots::All, Some(1)).poses(&Pose::IDENTITY);
         assert!(turned.windows(2).all(|w| w[0].orientation != w[1].orientation));
         assert_eq!(turned, copies(Slots::All, Some(1)).poses(&Pose::IDENTITY));
+
+        let second = Copies { variant: Some((1, 3)), ..copies(Slots::All, None) };
+        let of_all = copies(Slots::All, None).poses(&Pose::IDENTITY);
+        assert_eq!(second.poses(&Pose::IDENTITY), [of_all[1], of_all[4]]);
+
+        // Around a quarter in three turns of 30 degrees.
+        let around =
+            Copies { turn: Some(Turn { degrees: 30.0, ..quarter([0.0, 0.0, 1.0]) }), ..copies(Slots::All, None) };
+        let (first, fourth) = (around.poses(&Pose::IDENTITY)[0], around.poses(&Pose::IDENTITY)[3]);
+        let x = |pose: Pose| crate::math::sub(pose.transform([1.0, 0.0, 0.0]), pose.position);
+        assert!(norm(crate::math::sub(x(first), [1.0, 0.0, 0.0])) < 1e-15);
+        assert!(norm(crate::math::sub(x(fourth), [0.0, 1.0, 0.0])) < 1e-15);
     }
 }

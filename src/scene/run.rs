@@ -4,9 +4,10 @@ use super::build::Scene;
 use super::energy::Centre;
 use super::fault::{FieldFault, Places, SceneFault};
 use super::file::SceneFile;
-use super::frames::{write_obj, write_whole};
+use super::frames::{surfaces, write_obj, write_whole};
 use super::report::{Facts, Report};
 use super::statistics::{StepRow, processor_seconds};
+use super::subdivide::subdivided;
 use super::usd::UsdCache;
 use crate::math::dot;
 use crate::model::StepReport;
@@ -32,6 +33,8 @@ pub struct Options {
     pub resume: Option<PathBuf>,
     /// Seed that moves the starts a little; 0 moves nothing.
     pub jitter: u64,
+    /// Levels of subdivision of the finer frames; 0: there are none.
+    pub subdivide: u32,
 }
 
 /// Why there is no report.
@@ -95,11 +98,12 @@ pub fn run(options: &Options, watch: &mut dyn FnMut(u64, u64) -> bool) -> Result
     let key = run_key(&text, options);
     let mut run = Run::new(&file, scene, options, key)?;
     let last = options.steps.unwrap_or(file.steps());
-    run.frame(false)?;
+    let par = pool.as_ref().map_or(Par::Serial, Par::Pool);
+    run.frame(false, par)?;
     let mut interrupted = !watch(run.step, last) && run.step < last;
     while run.step < last && !interrupted {
-        run.advance(pool.as_ref().map_or(Par::Serial, Par::Pool))?;
-        run.frame(run.step == last)?;
+        run.advance(par)?;
+        run.frame(run.step == last, par)?;
         interrupted = !watch(run.step, last) && run.step < last;
     }
     run.finish(interrupted, last)
@@ -146,12 +150,14 @@ impl<'a> Run<'a> {
         }
         let Some(out) = &options.out else { return Ok(run) };
         let io = |e: io::Error| Failure::Io(format!("{}: {e}", out.display()));
-        std::fs::create_dir_all(out.join("frames")).map_err(io)?;
+        for folder in ["frames", "subdivided"].into_iter().take(1 + options.subdivide.min(1) as usize) {
+            std::fs::create_dir_all(out.join(folder)).map_err(io)?;
+            run.drop_later_frames(&out.join(folder)).map_err(io)?;
+        }
         run.rows = run.earlier_rows(&out.join("stats.csv"));
         let mut text = StepRow::COLUMNS.join(",") + "\n";
         run.rows.iter().for_each(|row| text += &(row.to_csv() + "\n"));
         write_whole(&out.join("stats.csv"), text.as_bytes()).map_err(io)?;
-        run.drop_later_frames(&out.join("frames")).map_err(io)?;
         if file.output.usd {
             let first = run.step.div_ceil(run.steps_per_frame);
             run.usd = Some(UsdCache::new(&run.scene, out, first).map_err(io)?);
@@ -223,13 +229,21 @@ impl<'a> Run<'a> {
     }
 
     /// Writes the frame of this step if it has one; the last step always has an OBJ frame.
-    fn frame(&mut self, last: bool) -> Result<(), Failure> {
+    fn frame(&mut self, last: bool, par: Par) -> Result<(), Failure> {
         let Some(out) = &self.options.out else { return Ok(()) };
         let io = |e: io::Error| Failure::Io(format!("{}: {e}", out.display()));
         let due = self.step.is_multiple_of(self.steps_per_frame);
         let path = out.join("frames").join(format!("frame_{:06}.obj", self.step));
         if self.file.output.obj && (due || last) && !path.exists() {
-            write_obj(&self.scene, &path).map_err(io)?;
+            let surfaces = surfaces(&self.scene).map_err(|e| io(io::Error::other(e.message)))?;
+            write_obj(&surfaces, &path).map_err(io)?;
+        }
+        let finer = out.join("subdivided").join(format!("frame_{:06}.obj", self.step));
+        if self.options.subdivide > 0 && (due || last) && !finer.exists() {
+            let settings = self.file.settings.settings();
+            let surfaces = subdivided(&self.scene, self.options.subdivide, &settings, par)
+                .map_err(|message| Failure::Step(self.step, message))?;
+            write_obj(&surfaces, &finer).map_err(io)?;
         }
         if let Some(usd) = &self.usd
             && due

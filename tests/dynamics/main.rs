@@ -3,4 +3,5 @@
 
 mod closed_forms;
 mod contact;
+mod local_response;
 mod scenes;

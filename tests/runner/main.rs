@@ -5,6 +5,8 @@
 mod command;
 
 mod faults;
+mod masonry;
 mod outputs;
 mod resume;
 mod scenes;
+mod subdivision;

@@ -56,9 +56,9 @@ fn the_final_line_has_what_was_promised() {
 }
 
 /// Bodies of an OBJ file: name, positions, faces from 0 over all positions of the file.
-type Group = (String, Vec<[f64; 3]>, Vec<[u32; 3]>);
+pub type Group = (String, Vec<[f64; 3]>, Vec<[u32; 3]>);
 
-fn read_obj(text: &str) -> Vec<Group> {
+pub fn read_obj(text: &str) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for line in text.lines() {
         let words: Vec<&str> = line.split(' ').collect();
@@ -158,11 +158,54 @@ fn a_pin_follows_a_scripted_body() {
         (groups[1].1[0], groups[0].1.clone())
     };
     let ((pin, paddle), (later, moved)) = (at("frame_000000"), at("frame_000040"));
-    let distance = |x: &[f64; 3]| (0..3).map(|k| (x[k] - pin[k]).powi(2)).sum::<f64>();
-    let nearest = (0..paddle.len()).min_by(|a, b| distance(&paddle[*a]).total_cmp(&distance(&paddle[*b]))).unwrap();
-    for k in 0..3 {
-        let way = moved[nearest][k] - paddle[nearest][k];
-        assert!((later[k] - pin[k] - way).abs() < 1e-9, "{later:?}");
+    // As a part of the paddle, which moves and turns: its distance to every vertex stays.
+    let distance = |x: &[f64; 3], y: &[f64; 3]| (0..3).map(|k| (x[k] - y[k]).powi(2)).sum::<f64>().sqrt();
+    for (from, to) in paddle.iter().zip(&moved) {
+        assert!((distance(&pin, from) - distance(&later, to)).abs() < 1e-9, "{later:?}");
     }
     assert!(later[0] > pin[0] + 0.05);
+}
+
+/// Two frames of a square: its left half stays, its right half rises by 0.1 m. All of it turns by a quarter about z.
+#[test]
+fn frames_are_carried_along_and_pins_follow_their_mean() {
+    let folder = Folder::new("carried");
+    folder.file("square.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n");
+    let square = [[0.0f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let mut bytes: Vec<u8> = [2u32, 4].iter().flat_map(|n| n.to_le_bytes()).collect();
+    for rise in [0.0, 0.1] {
+        let points = square.iter().flat_map(|x| [x[0], x[1], rise * x[0]]);
+        bytes.extend(points.flat_map(f32::to_le_bytes));
+    }
+    std::fs::write(folder.0.join("square.frames"), bytes).unwrap();
+    let scene = r#"
+title = "A square that bends and turns"
+dt = 0.1
+duration = 1.0
+gravity = [0.0, 0.0, 0.0]
+[output]
+frames_per_second = 10.0
+[[sheet]]
+name = "cloth"
+mesh.grid = { cells = [2, 1], size = [1.0, 0.5] }
+placement.position = [0.5, 0.5, 0.5]
+material = { density = 300.0, thickness = 0.001, young_modulus = 1e3 }
+pins = [{ vertices = [0, 2, 4], follow = "square", follow_within = 0.8 }]
+[[kinematic]]
+name = "square"
+mesh.obj.file = "square.obj"
+frames = { file = "square.frames", seconds_per_frame = 1.0 }
+motion = [{ until = 1.0, angular_velocity = [0.0, 0.0, 1.5707963267948966] }]
+"#;
+    folder.file("scene.toml", scene);
+    report(&folder, &["scene.toml", "--out", "out"]);
+    let groups = read_obj(&folder.read("out/frames/frame_000010.obj"));
+    let near = |x: [f64; 3], y: [f64; 3]| assert!((0..3).all(|k| (x[k] - y[k]).abs() < 1e-7), "{x:?} {y:?}");
+    near(groups[0].1[1], [0.0, 1.0, 0.1]);
+    near(groups[0].1[2], [-1.0, 1.0, 0.1]);
+    // Within 0.8 of the first pin, at (0, 0.25, 0.5), is one vertex, which stays; of the second, at (0.5, 0.25, 0.5),
+    // that one and one that rises, as far; of the third the one that rises.
+    near(groups[1].1[0], [-0.25, 0.0, 0.5]);
+    near(groups[1].1[2], [-0.25, 0.5, 0.55]);
+    near(groups[1].1[4], [-0.25, 1.0, 0.6]);
 }
