@@ -38,8 +38,19 @@ pub(super) struct Control {
     pub iterations_max: u32,
     /// Iterations without halving the residuals together after which the run ends as stagnated.
     pub patience: u32,
-    /// Whether iterations make twelve passes from the first on.
-    pub thorough: bool,
+    /// Passes of an iteration.
+    pub passes: Passes,
+}
+
+/// How many passes over the contacts an iteration makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Passes {
+    /// One; the run ends as stagnated where that is not enough.
+    One,
+    /// One, and more on stagnation.
+    Growing,
+    /// Twelve from the first iteration on, and more on stagnation.
+    Many,
 }
 
 /// Sums of one product sweep.
@@ -121,22 +132,26 @@ struct PassSchedule {
 }
 
 impl PassSchedule {
-    fn new(blocks: usize, thorough: bool) -> PassSchedule {
+    fn new(blocks: usize, passes: Passes) -> PassSchedule {
         let most = PASSES.partition_point(|p| *p <= PASSES_ALWAYS) - 1;
-        PassSchedule { level: if thorough { most } else { 0 }, stagnation: Stagnation::new(PASSES_PATIENCE), blocks }
+        let level = if passes == Passes::Many { most } else { 0 };
+        PassSchedule { level, stagnation: Stagnation::new(PASSES_PATIENCE), blocks }
     }
 
     fn passes(&self) -> u32 {
         PASSES[self.level]
     }
 
-    /// Judges the contact residual at `iteration`; a pass relaxes `contacts`.
-    fn observe(&mut self, residual: f64, iteration: u32, contacts: usize) {
+    /// Judges the contact residual at `iteration`; a pass relaxes `contacts`. Returns whether it stagnated.
+    fn observe(&mut self, residual: f64, iteration: u32, contacts: usize) -> bool {
         let stagnated = self.stagnation.seen(residual, iteration);
-        let Some(next) = PASSES.get(self.level + 1) else { return };
-        if stagnated && (*next <= PASSES_ALWAYS || *next as usize * contacts <= self.blocks) {
+        if let Some(next) = PASSES.get(self.level + 1)
+            && stagnated
+            && (*next <= PASSES_ALWAYS || *next as usize * contacts <= self.blocks)
+        {
             self.level += 1;
         }
+        stagnated
     }
 }
 
@@ -163,7 +178,7 @@ pub(super) fn run(
         double(at, FIRST_SCALE)
     };
     let mut test = StopTest::new();
-    let mut schedule = PassSchedule::new(task.problem.matrix.values.len(), control.thorough);
+    let mut schedule = PassSchedule::new(task.problem.matrix.values.len(), control.passes);
     let mut stagnation = Stagnation::new(control.patience);
     let mut now = Iterate::default();
     let mut k = 0;
@@ -184,8 +199,12 @@ pub(super) fn run(
             }
             Verdict::Continue => {}
         }
-        if residuals.contact() > task.settings.contact_tolerance {
-            schedule.observe(residuals.contact(), k, engine.relaxed());
+        if residuals.contact() > task.settings.contact_tolerance
+            && schedule.observe(residuals.contact(), k, engine.relaxed())
+            && control.passes == Passes::One
+        {
+            engine.account(work);
+            return Run { iterations: k, ending: Ending::Stagnated, error: None };
         }
         let stagnated = stagnation.seen(residuals.merit(), k);
         if stagnated && let Engine::Single(_) = &engine {

@@ -7,12 +7,13 @@
 
 use super::direct_newton::DirectNewton;
 use super::friction::{project, project_tangent};
+use super::newton_system::{Acting, NewtonSystem};
 use super::packed_contacts::{contact_velocity, relative_velocity, world_stiffness};
 use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure};
-use super::stop_test::{Ending, Run, StopTest, Verdict};
-use crate::linalg::{GradientBuffers, conjugate_gradient};
-use crate::math::{Mat3, Vec3, add, add_scaled, dot, inverse, mat_add, mat_scale, mat_vec, norm, sub};
+use super::stop_test::{Ending, Run, Stagnation, StopTest, Verdict};
+use crate::math::{Mat3, Vec3, add_scaled, dot, mat_add, mat_scale, mat_vec, norm, sub};
 use crate::model::FrictionCone;
+use crate::parallel::BLOCK;
 
 /// Penalty stiffness relative to the effective mass of a contact.
 const STIFFNESS: f64 = 3.0;
@@ -41,60 +42,52 @@ struct Penalty {
 struct Lagrangian<'a, 'b> {
     task: &'b Task<'a>,
     penalties: Vec<Penalty>,
-    /// `P(p - rho w)` at the current `dv`.
-    trial: Vec<Vec3>,
-    impulses: Vec<Vec3>,
-    /// World stiffness of the contacts that are not free.
-    stiffness: Vec<Option<Mat3>>,
+    /// Normal velocity of each contact at the current `dv` `[m/s]`, and its change along the step.
+    normals: Vec<f64>,
+    normal_steps: Vec<f64>,
+    /// Contacts that act at the current `dv`.
+    system: NewtonSystem,
     gradient: Vec<Vec3>,
     step: Vec<Vec3>,
     /// `A dv` and `A step`.
     product: Vec<Vec3>,
     step_product: Vec<Vec3>,
-    linear: GradientBuffers,
     /// Factors Newton systems; `None` where conjugate gradients are cheaper.
     direct: Option<DirectNewton>,
-    /// Contact of each row of the row set, if it is among the packed ones.
-    contact_of_row: Vec<Option<u32>>,
     work: Work,
 }
 
-/// Runs from `at` until the tolerances are met or `iterations_max`; leaves the best iterate. Iterations count the steps
-/// of the linear solves, which cost about as much as an iteration of the other solvers.
+/// Runs from `at` until the tolerances are met, `iterations_max`, or `patience` iterations did not halve the residuals;
+/// leaves the best iterate. Iterations count the steps of the linear solves, which cost about as much as an iteration of
+/// the other solvers.
 pub(super) fn run(
     task: &Task,
     at: &mut Iterate,
     iterations_max: u32,
+    patience: u32,
     buffers: &mut MeasureBuffers,
     work: &mut Work,
 ) -> Run {
-    let blocks = at.dv.len();
-    let zeros = || vec![[0.0; 3]; blocks];
+    let zeros = || vec![[0.0; 3]; at.dv.len()];
     let contacts = at.p.len();
     let direct = DirectNewton::new(task.problem);
     let relative = if direct.is_some() { STIFFNESS_FACTORED } else { STIFFNESS };
-    let mut contact_of_row = vec![None; task.problem.rows.len()];
-    for (c, contact) in task.packed.contacts.iter().enumerate() {
-        contact_of_row[contact.source as usize] = Some(c as u32);
-    }
     let mut l = Lagrangian {
         task,
         penalties: task.par.map_indexed(contacts, |c| {
             penalty(relative, task.packed.natural_scale(c, task.problem.rows, task.problem.inverse_diagonal))
         }),
-        trial: vec![[0.0; 3]; contacts],
-        impulses: Vec::new(),
-        stiffness: vec![None; contacts],
+        normals: vec![0.0; contacts],
+        normal_steps: vec![0.0; contacts],
+        system: NewtonSystem::default(),
         gradient: zeros(),
         step: zeros(),
         product: zeros(),
         step_product: zeros(),
-        linear: GradientBuffers::default(),
         direct,
-        contact_of_row,
         work: Work::default(),
     };
-    let run = l.iterate(at, iterations_max, buffers);
+    let run = l.iterate(at, iterations_max, Stagnation::new(patience), buffers);
     // Bounds were frozen: what is left of that, within the tolerances, goes.
     for (p, contact) in at.p.iter_mut().zip(&task.packed.contacts) {
         *p = project(task.settings.friction_cone, contact.friction, *p);
@@ -110,11 +103,17 @@ fn penalty(relative: f64, [normal, tangent]: [f64; 2]) -> Penalty {
 }
 
 impl Lagrangian<'_, '_> {
-    fn iterate(&mut self, at: &mut Iterate, iterations_max: u32, buffers: &mut MeasureBuffers) -> Run {
+    fn iterate(
+        &mut self,
+        at: &mut Iterate,
+        iterations_max: u32,
+        mut stagnation: Stagnation,
+        buffers: &mut MeasureBuffers,
+    ) -> Run {
         let mut now = at.clone();
         let mut test = StopTest::new();
         let mut iterations = 0;
-        self.task.problem.matrix.product(&now.dv, &mut self.product, self.task.par);
+        self.start(&now);
         while iterations < iterations_max {
             for (penalty, (contact, p)) in self.penalties.iter_mut().zip(self.task.packed.contacts.iter().zip(&now.p)) {
                 penalty.bound = contact.friction * p[0];
@@ -135,7 +134,10 @@ impl Lagrangian<'_, '_> {
                 }
             }
             self.evaluate(&now);
-            now.p.copy_from_slice(&self.trial);
+            now.p.fill([0.0; 3]);
+            for acting in &self.system.acting {
+                now.p[acting.contact as usize] = acting.trial;
+            }
             let residuals = measure(self.task, &now, buffers, &mut self.work);
             self.product.copy_from_slice(&buffers.product);
             match test.check(self.task, &now, &residuals, at, buffers, &mut self.work) {
@@ -145,8 +147,11 @@ impl Lagrangian<'_, '_> {
                     // Softer contacts from the best iterate.
                     self.scale_stiffness(0.3);
                     now.clone_from(at);
-                    self.task.problem.matrix.product(&now.dv, &mut self.product, self.task.par);
+                    self.start(&now);
                 }
+            }
+            if stagnation.seen(residuals.merit(), iterations) {
+                return Run { iterations, ending: Ending::Stagnated, error: None };
             }
         }
         Run { iterations, ending: Ending::Exhausted, error: None }
@@ -158,36 +163,50 @@ impl Lagrangian<'_, '_> {
         }
     }
 
-    /// Trial multipliers, contact stiffness and gradient at `now`; returns the largest change of a multiplier over its
-    /// stiffness `[m/s]`.
+    /// What follows `dv` from step to step, at a new one.
+    fn start(&mut self, now: &Iterate) {
+        let Task { problem, packed, par, .. } = *self.task;
+        problem.matrix.product(&now.dv, &mut self.product, par);
+        par.map_into(&mut self.normals, |c| {
+            let contact = &packed.contacts[c];
+            dot(contact.frame[0], relative_velocity(contact, problem.rows, &now.dv)) + contact.target[0]
+        });
+    }
+
+    /// The contacts that act at `now`, their trial multipliers and stiffness, and the gradient; returns the largest change
+    /// of a multiplier over its stiffness `[m/s]`.
     fn evaluate(&mut self, now: &Iterate) -> f64 {
         let Task { problem, packed, settings, par, .. } = *self.task;
-        let penalties = &self.penalties;
-        let cone = settings.friction_cone;
-        par.map_into(&mut self.trial, |c| {
-            let w = contact_velocity(&packed.contacts[c], problem.rows, &now.dv);
-            project_trial(cone, &penalties[c], pulled(&penalties[c], now.p[c], w))
-        });
-        par.map_into(&mut self.stiffness, |c| {
-            let contact = &packed.contacts[c];
-            let y = pulled(&penalties[c], now.p[c], contact_velocity(contact, problem.rows, &now.dv));
-            tangent_stiffness(cone, &penalties[c], y).map(|s| world_stiffness(&contact.frame, &s))
-        });
-        packed.impulses(&self.trial, &mut self.impulses, par);
-        let (f, product) = (&self.impulses, &self.product);
-        par.map_into(&mut self.gradient, |b| sub(product[b], packed.gather(b, f)));
-        self.work.contacts += 4 * now.p.len() as u64;
-        let mut largest = 0.0f64;
-        for ((penalty, trial), p) in self.penalties.iter().zip(&self.trial).zip(&now.p) {
-            let [n, t] = penalty.stiffness;
-            if n > 0.0 {
-                largest = largest.max((trial[0] - p[0]).abs() / n);
+        let (penalties, normals) = (&self.penalties, &self.normals);
+        let count = now.p.len();
+        let acts = |c: &usize| now.p[*c] != [0.0; 3] || penalties[*c].stiffness[0] * normals[*c] < 0.0;
+        let of = |c: usize| {
+            let (contact, penalty) = (&packed.contacts[c], &penalties[c]);
+            let y = pulled(penalty, now.p[c], contact_velocity(contact, problem.rows, &now.dv));
+            let stiffness = tangent_stiffness(settings.friction_cone, penalty, y);
+            Acting {
+                contact: c as u32,
+                trial: project_trial(settings.friction_cone, penalty, y),
+                stiffness: stiffness.map(|s| world_stiffness(&contact.frame, &s)),
             }
-            if t > 0.0 {
-                largest = largest.max((trial[1] - p[1]).abs().max((trial[2] - p[2]).abs()) / t);
-            }
-        }
-        largest
+        };
+        let mut parts: Vec<(usize, Vec<Acting>)> = (0..count).step_by(BLOCK).map(|start| (start, Vec::new())).collect();
+        par.for_each_task(&mut parts, |(start, part)| {
+            part.extend((*start..count.min(*start + BLOCK)).filter(acts).map(of));
+        });
+        self.system.acting.clear();
+        self.system.acting.extend(parts.into_iter().flat_map(|(_, part)| part));
+        self.system.index(self.task);
+        let (incidence, impulses, product) = (&self.system.incidence, &self.system.impulses, &self.product);
+        par.map_into(&mut self.gradient, |b| sub(product[b], incidence.gather(b, impulses)));
+        self.work.contacts += 4 * self.system.acting.len() as u64;
+        let change = |acting: &Acting| {
+            let c = acting.contact as usize;
+            let ([n, t], d) = (penalties[c].stiffness, sub(acting.trial, now.p[c]));
+            let over = |d: f64, stiffness: f64| if stiffness > 0.0 { d / stiffness } else { 0.0 };
+            over(d[0].abs(), n).max(over(d[1].abs().max(d[2].abs()), t))
+        };
+        self.system.acting.iter().map(change).fold(0.0, f64::max)
     }
 
     /// Largest `|D^-1 gradient|` `[m/s]`.
@@ -198,50 +217,20 @@ impl Lagrangian<'_, '_> {
 
     /// Solves for the Newton step; returns the steps of the linear solve.
     fn newton_step(&mut self, steps_max: u32) -> u32 {
-        let Task { problem, packed, single, par, .. } = *self.task;
-        let stiffness = &self.stiffness;
+        let Task { problem, packed, .. } = *self.task;
         if let Some(direct) = &mut self.direct {
             for (step, g) in self.step.iter_mut().zip(&self.gradient) {
                 *step = g.map(|x| -x);
             }
-            let of_row = |row: usize| self.contact_of_row[row].and_then(|c| stiffness[c as usize]);
-            if direct.solve(of_row, &mut self.step) {
+            let row = |a: &Acting| Some((packed.contacts[a.contact as usize].source as usize, a.stiffness?));
+            if direct.solve(self.system.acting.iter().filter_map(row), &mut self.step) {
                 self.work.blocks += problem.matrix.values.len() as u64;
-                self.work.contacts += 2 * packed.contacts.len() as u64;
+                self.work.contacts += 2 * self.system.acting.len() as u64;
                 return 1;
             }
         }
-        let preconditioner: Vec<Mat3> = par.map_indexed(self.gradient.len(), |b| {
-            let source = &problem.inverse_diagonal[b];
-            if *source == [[0.0; 3]; 3] || !packed.touches(b) {
-                return *source;
-            }
-            let mut sum = [[0.0; 3]; 3];
-            packed.add_diagonal(b, &mut sum, |c| stiffness[c]);
-            inverse(&mat_add(problem.matrix.diagonal_block(b), &sum)).unwrap_or(*source)
-        });
-        let minus: Vec<Vec3> = self.gradient.iter().map(|g| g.map(|x| -x)).collect();
-        let impulses = &mut self.impulses;
-        let apply = |d: &[Vec3], out: &mut [Vec3]| {
-            par.map_into(impulses, |c| match &stiffness[c] {
-                Some(e) => mat_vec(e, relative_velocity(&packed.contacts[c], problem.rows, d)),
-                None => [0.0; 3],
-            });
-            let f = &*impulses;
-            // The step is only wanted to a digit: single precision.
-            let rounded = single.round(d.len(), |b| d[b], par);
-            par.map_into(out, |b| {
-                let y = single.row_product(b, &rounded);
-                if packed.touches(b) { add(y, packed.gather(b, f)) } else { y }
-            });
-        };
-        let precondition = |r: &[Vec3], z: &mut [Vec3]| par.map_into(z, |b| mat_vec(&preconditioner[b], r[b]));
         let control = (LINEAR_SOLVE.0, LINEAR_SOLVE.1.min(steps_max));
-        let (steps, _) =
-            conjugate_gradient(apply, precondition, &minus, &mut self.step, true, control, &mut self.linear, par);
-        self.work.blocks += u64::from(steps) * problem.matrix.values.len() as u64;
-        self.work.contacts += u64::from(steps) * 2 * packed.contacts.len() as u64;
-        steps
+        self.system.solve(self.task, &self.gradient, &mut self.step, control, &mut self.work)
     }
 
     /// Moves `now.dv` along the step, all of it where that leaves a small slope.
@@ -252,22 +241,31 @@ impl Lagrangian<'_, '_> {
         let n = step.len();
         let linear = par.sum(n, |b| dot(step[b], product[b]));
         let curvature = par.sum(n, |b| dot(step[b], step_product[b]));
-        let seen: Vec<[Vec3; 2]> = par.map_indexed(packed.contacts.len(), |c| {
+        par.map_into(&mut self.normal_steps, |c| {
             let contact = &packed.contacts[c];
+            dot(contact.frame[0], relative_velocity(contact, problem.rows, step))
+        });
+        let (p, penalties, normals, normal_steps) = (&now.p, &self.penalties, &self.normals, &self.normal_steps);
+        // The trial of a contact without multiplier is zero all along where it is zero at both ends.
+        let acts = |c: &usize| {
+            p[*c] != [0.0; 3] || penalties[*c].stiffness[0] * normals[*c].min(normals[*c] + normal_steps[*c]) < 0.0
+        };
+        let list: Vec<usize> = (0..p.len()).filter(acts).collect();
+        let seen: Vec<[Vec3; 2]> = par.map_indexed(list.len(), |k| {
+            let contact = &packed.contacts[list[k]];
             let d = relative_velocity(contact, problem.rows, step);
             let f = &contact.frame;
             [contact_velocity(contact, problem.rows, &now.dv), [dot(f[0], d), dot(f[1], d), dot(f[2], d)]]
         });
-        let (penalties, p) = (&self.penalties, &now.p);
         let slope = |alpha: f64| {
-            let contacts = par.sum(seen.len(), |c| {
-                let [w, d] = seen[c];
+            let contacts = par.sum(seen.len(), |k| {
+                let ([w, d], c) = (seen[k], list[k]);
                 let y = pulled(&penalties[c], p[c], add_scaled(w, alpha, d));
                 dot(project_trial(settings.friction_cone, &penalties[c], y), d)
             });
             linear + alpha * curvature - contacts
         };
-        self.work.contacts += 3 * seen.len() as u64;
+        self.work.contacts += (p.len() + 2 * seen.len()) as u64;
         let first = slope(0.0);
         let (mut low, mut high) = (0.0, 1.0);
         let (mut at_low, mut at_high) = (first, slope(1.0));
@@ -293,6 +291,9 @@ impl Lagrangian<'_, '_> {
         }
         for (y, a) in self.product.iter_mut().zip(&self.step_product) {
             *y = add_scaled(*y, alpha, *a);
+        }
+        for (w, d) in self.normals.iter_mut().zip(&self.normal_steps) {
+            *w += alpha * d;
         }
         self.work.blocks += problem.matrix.values.len() as u64;
     }

@@ -22,7 +22,7 @@ pub(super) fn solve(task: &Task, at: &mut Iterate, iterations_max: u32, work: &m
     let respond = |p: &[Vec3], dv: &mut Vec<Vec3>, impulses: &mut Vec<Vec3>| {
         packed.impulses(p, impulses, par);
         let f = &*impulses;
-        par.map_into(dv, |b| mat_vec(&inverse[b], packed.gather(b, f)));
+        par.map_into(dv, |b| mat_vec(&inverse[b], packed.incidence.gather(b, f)));
     };
     let mut impulses = Vec::new();
     respond(&at.p, &mut at.dv, &mut impulses);

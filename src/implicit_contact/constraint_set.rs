@@ -107,7 +107,10 @@ impl ConstraintSet {
     fn push(&mut self, model: &Model, contact: Contact, memory: &Memory, settings: &Settings, dt: f64) {
         let (impulse, tangent) = memory.warm_start(model, &contact, dt);
         let pushes = dot(contact.normal, impulse) > 0.0;
-        self.required_gaps.push(contact.required_gap(settings.recovery_fraction));
+        let position_level = settings.ablation.position_level;
+        let required =
+            if position_level { contact.required_gap(settings.recovery_fraction) } else { contact.start_gap };
+        self.required_gaps.push(required);
         self.kept_tangents.push(tangent);
         self.solved.push(Solved { impulse: if pushes { impulse } else { [0.0; 3] }, ..Solved::default() });
         self.contacts.push(contact);

@@ -65,7 +65,7 @@ impl<'a, 'b> DoubleRelaxation<'a, 'b> {
         packed.impulses(&r.p, &mut impulses, par);
         let (nodes, inverse) = (&r.nodes, &r.inverse);
         par.map_into(&mut r.u, |b| {
-            add(nodes[b].z, mat_vec(&inverse[b], sub(packed.gather(b, &impulses), nodes[b].a_z)))
+            add(nodes[b].z, mat_vec(&inverse[b], sub(packed.incidence.gather(b, &impulses), nodes[b].a_z)))
         });
         r
     }

@@ -64,7 +64,7 @@ fn respond(task: &Task, now: &mut Iterate, buffers: &mut MeasureBuffers, work: &
     task.packed.impulses(&now.p, &mut buffers.impulses, task.par);
     let f = &buffers.impulses;
     buffers.contact.resize(now.dv.len(), [0.0; 3]);
-    task.par.map_into(&mut buffers.contact, |b| task.packed.gather(b, f));
+    task.par.map_into(&mut buffers.contact, |b| task.packed.incidence.gather(b, f));
     solve_metric(task, &buffers.contact, &mut now.dv, &mut GradientBuffers::default(), work);
 }
 
@@ -86,7 +86,9 @@ fn delassus(task: &Task, work: &mut Work) -> Vec<Mat3> {
     let mut buffers = GradientBuffers::default();
     for column in 0..contacts {
         let source = packed.contacts[column].source as usize;
-        for (axis, direction) in rows.frames[source].iter().enumerate() {
+        // Without friction the tangential multipliers stay zero: their columns are never multiplied.
+        let axes = if packed.contacts[column].friction > 0.0 { 3 } else { 1 };
+        for (axis, direction) in rows.frames[source].iter().enumerate().take(axes) {
             load.fill([0.0; 3]);
             rows.scatter(source, *direction, &mut load);
             solve_metric(task, &load, &mut response, &mut buffers, work);

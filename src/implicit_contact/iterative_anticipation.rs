@@ -19,7 +19,7 @@ const SCALE_MAX: f64 = 100.0;
 /// The inner loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Inner {
-    /// Three repeats per contact, passes until the residuals change by less than 5 %.
+    /// Repeats per contact as the settings say, passes until the residuals change by less than 5 %.
     Paper,
     /// One pass, one local step per contact.
     Light,
@@ -51,13 +51,13 @@ pub(super) fn run(
             let (q, y, dv, s) = (&buffers.contact, &buffers.product, &now.dv, &scaled);
             task.par.map_into(&mut predicted, |b| add(dv[b], mat_vec(&s[b], sub(q[b], y[b]))));
         }
-        let repeats = if inner == Inner::Paper { 3 } else { 1 };
+        let repeats = if inner == Inner::Paper { task.settings.ablation.repeats.max(1) } else { 1 };
         let (rows, cone) = (task.problem.rows, task.settings.friction_cone);
         let cx = PassContext { rows, inverse: &scaled, metrics: &metrics, cone, repeats, par: task.par };
         relax(task, inner, &cx, &mut now.p, &mut predicted, work);
         task.packed.impulses(&now.p, &mut buffers.impulses, task.par);
         let f = &buffers.impulses;
-        task.par.map_into(&mut buffers.contact, |b| task.packed.gather(b, f));
+        task.par.map_into(&mut buffers.contact, |b| task.packed.incidence.gather(b, f));
         gauss_seidel_sweep(task.problem.matrix, inverse, &buffers.contact, &mut now.dv);
         work.blocks += task.problem.matrix.values.len() as u64;
         let residuals = measure(task, &now, buffers, work);

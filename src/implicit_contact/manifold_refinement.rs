@@ -114,7 +114,11 @@ pub(super) fn refine(
     let factor = settings.proximity_factor.max(1.0);
     let x0 = &segment.start.positions;
     let candidates = scratch.candidates.update(model, around.filter, x0, &linear_end.positions, factor, par);
-    let near = near_contacts(model, around.filter, passing, candidates, segment.start, &linear_end, factor, par);
+    let near = if settings.ablation.near_contacts {
+        near_contacts(model, around.filter, passing, candidates, segment.start, &linear_end, factor, par)
+    } else {
+        Vec::new()
+    };
     refined.set = ConstraintSet::new(model, near, memory, &settings, segment.dt);
     refined.set.admit(model, &linear_end.positions, 1.0, memory, &settings, segment.dt);
     account.search += lap(&mut clock);

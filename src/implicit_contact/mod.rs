@@ -5,10 +5,12 @@
 //! * `iterative_anticipation`: the solver of the paper
 //! * `splitting_start`: a few iterations of operator splitting before it
 //! * `augmented_lagrangian`: the fallback where rows conflict
-//! * `direct_newton`: its linear systems factored, where they are small
+//! * `newton_system`: the contacts that act in its Newton steps, and their linear systems
+//! * `direct_newton`: the same systems factored, where they are small
 //! * `full_anticipation`: the dense baseline
 //! * `block_diagonal`: the solver for lumped masses and rigid bodies alone
 //! * `packed_contacts`: contacts laid out for relaxation passes
+//! * `incidence`: the contacts of each block
 //! * `single_pass`: the relaxation pass in single precision, over the contacts that are near
 //! * `single_relaxation`, `double_relaxation`: iterations of the default solver in either precision
 //! * `friction`: the local solve of one contact
@@ -34,9 +36,11 @@ mod driven;
 mod fall_back;
 mod friction;
 mod full_anticipation;
+mod incidence;
 mod iterative_anticipation;
 mod manifold_refinement;
 mod memory;
+mod newton_system;
 mod packed_contacts;
 mod problem;
 mod residuals;

@@ -2,6 +2,7 @@
 //! contacts of each block for gathering `C^T p`.
 
 use super::friction::{LocalMetric, local_step, project_tangent};
+use super::incidence::Incidence;
 use super::problem::ContactProblem;
 use crate::constraint::RowSet;
 use crate::linalg::{Colouring, colour};
@@ -40,14 +41,8 @@ pub(super) struct PackedContacts {
     pub contacts: Vec<Contact>,
     /// Groups of records that share no block; the last one is swept in order.
     pub groups: Vec<usize>,
-    /// Start of each block's entries in `incidence`.
-    incidence_offsets: Vec<u32>,
-    /// Contact and signed weight.
-    incidence: Vec<(u32, f64)>,
-    /// Start of each block's entries in `angular_incidence`; empty when there are none.
-    angular_offsets: Vec<u32>,
-    /// Contact and weighted lever.
-    angular_incidence: Vec<(u32, Vec3)>,
+    /// The contacts of each block.
+    pub incidence: Incidence,
 }
 
 /// World velocity that contact `contact` sees in `v`.
@@ -163,44 +158,9 @@ impl PackedContacts {
             Colouring { order: (0..rows.len() as u32).collect(), offsets: vec![0, rows.len()] }
         };
         let contacts = par.map_indexed(rows.len(), |k| pack(rows, order.order[k] as usize));
-        let mut packed = PackedContacts { contacts, groups: order.offsets, ..PackedContacts::default() };
-        packed.gather_lists(rows, blocks);
-        packed
-    }
-
-    fn gather_lists(&mut self, rows: &RowSet, blocks: usize) {
-        let linear = |i: usize| rows.offsets[i] as usize..rows.offsets[i + 1] as usize;
-        let angular = |i: usize| rows.angular_offsets[i] as usize..rows.angular_offsets[i + 1] as usize;
-        let mut counts = vec![0u32; blocks + 1];
-        let mut angular_counts = vec![0u32; blocks + 1];
-        for b in &rows.blocks {
-            counts[*b as usize + 1] += 1;
-        }
-        for a in &rows.angular {
-            angular_counts[a.block as usize + 1] += 1;
-        }
-        for b in 0..blocks {
-            counts[b + 1] += counts[b];
-            angular_counts[b + 1] += angular_counts[b];
-        }
-        let (mut next, mut angular_next) = (counts.clone(), angular_counts.clone());
-        self.incidence = vec![(0, 0.0); rows.blocks.len()];
-        self.angular_incidence = vec![(0, [0.0; 3]); rows.angular.len()];
-        for (c, contact) in self.contacts.iter().enumerate() {
-            let i = contact.source as usize;
-            for k in linear(i) {
-                let slot = &mut next[rows.blocks[k] as usize];
-                self.incidence[*slot as usize] = (c as u32, rows.weights[k]);
-                *slot += 1;
-            }
-            for a in &rows.angular[angular(i)] {
-                let slot = &mut angular_next[a.block as usize];
-                self.angular_incidence[*slot as usize] = (c as u32, a.lever);
-                *slot += 1;
-            }
-        }
-        self.incidence_offsets = counts;
-        self.angular_offsets = if rows.angular.is_empty() { Vec::new() } else { angular_counts };
+        let mut incidence = Incidence::default();
+        incidence.rebuild(rows, blocks, contacts.iter().map(|c| c.source as usize));
+        PackedContacts { contacts, groups: order.offsets, incidence }
     }
 
     /// Local metric of contact `c` for the block-diagonal metric with this inverse.
@@ -234,56 +194,6 @@ impl PackedContacts {
     pub fn impulses(&self, p: &[Vec3], out: &mut Vec<Vec3>, par: Par) {
         out.resize(self.contacts.len(), [0.0; 3]);
         par.map_into(out, |c| self.contacts[c].in_world(p[c]));
-    }
-
-    /// Block `b` of `W^T f`, summed in the order of the sweeps.
-    #[inline]
-    pub fn gather(&self, b: usize, f: &[Vec3]) -> Vec3 {
-        let mut total = [0.0; 3];
-        for (c, w) in &self.incidence[self.incidence_offsets[b] as usize..self.incidence_offsets[b + 1] as usize] {
-            total = add_scaled(total, *w, f[*c as usize]);
-        }
-        if !self.angular_offsets.is_empty() {
-            let range = self.angular_offsets[b] as usize..self.angular_offsets[b + 1] as usize;
-            for (c, lever) in &self.angular_incidence[range] {
-                total = add(total, cross(*lever, f[*c as usize]));
-            }
-        }
-        total
-    }
-
-    /// Whether any contact touches block `b`.
-    pub fn touches(&self, b: usize) -> bool {
-        self.incidence_offsets[b] != self.incidence_offsets[b + 1]
-            || (!self.angular_offsets.is_empty() && self.angular_offsets[b] != self.angular_offsets[b + 1])
-    }
-
-    /// Adds `W^T E W` of block `b` to `sum`, `e(c)` being the symmetric world stiffness of contact `c`: the diagonal
-    /// block of `C^T diag C`.
-    pub fn add_diagonal(&self, b: usize, sum: &mut Mat3, e: impl Fn(usize) -> Option<Mat3>) {
-        for (c, w) in &self.incidence[self.incidence_offsets[b] as usize..self.incidence_offsets[b + 1] as usize] {
-            if let Some(m) = e(*c as usize) {
-                for i in 0..3 {
-                    sum[i] = add_scaled(sum[i], w * w, m[i]);
-                }
-            }
-        }
-        if !self.angular_offsets.is_empty() {
-            let range = self.angular_offsets[b] as usize..self.angular_offsets[b + 1] as usize;
-            for (c, lever) in &self.angular_incidence[range] {
-                if let Some(m) = e(*c as usize) {
-                    // L = [lever]x: torque = L f, seen velocity = L^T omega, so the block is L E L^T.
-                    for axis in 0..3 {
-                        let mut unit = [0.0; 3];
-                        unit[axis] = 1.0;
-                        let column = cross(*lever, mat_vec(&m, cross(unit, *lever)));
-                        for i in 0..3 {
-                            sum[i][axis] += column[i];
-                        }
-                    }
-                }
-            }
-        }
     }
 
     /// One projected Gauss-Seidel pass over `list` (all contacts when `None`): each contact is relaxed `repeats` times

@@ -1,6 +1,6 @@
 //! The frictional contact problem [Otaduy09, Eq. 7] over one metric, and the one signature of its solvers.
 
-use super::accelerated_relaxation::Control;
+use super::accelerated_relaxation::{Control, Passes};
 use super::friction::project;
 use super::iterative_anticipation::{self, Inner};
 use super::packed_contacts::PackedContacts;
@@ -110,6 +110,10 @@ pub fn solve(
     report
 }
 
+/// Iterations of the first turn of the augmented Lagrangian at most, and how many of a turn may not halve the residuals.
+const FIRST_TURN: u32 = 400;
+const TURN_PATIENCE: u32 = 100;
+
 /// Passes over uncoupled blocks before the augmented Lagrangian has its first turn.
 const UNCOUPLED_TURN: u32 = 32;
 
@@ -131,10 +135,10 @@ fn choose(
             report.paper_iterations = paper_iterations;
             run
         }
-        SolverChoice::AugmentedLagrangian => augmented_lagrangian::run(task, at, max, buffers, work),
+        SolverChoice::AugmentedLagrangian => augmented_lagrangian::run(task, at, max, u32::MAX, buffers, work),
         SolverChoice::FullAnticipation => full_anticipation::run(task, at, max, buffers, work),
         SolverChoice::AcceleratedRelaxation => {
-            let control = Control { iterations_max: max, patience: u32::MAX, thorough: false };
+            let control = Control { iterations_max: max, patience: u32::MAX, passes: Passes::Growing };
             accelerated_relaxation::run(task, coupled, at, control, buffers, work)
         }
         SolverChoice::Automatic if coupled.iter().any(|c| *c) => automatic(task, coupled, at, buffers, work, report),
@@ -145,9 +149,9 @@ fn choose(
     run.error
 }
 
-/// A short splitting start if asked for, relaxation, and the augmented Lagrangian when that stagnates. Where that does
-/// not get there either, with as many iterations as went before, relaxation takes over again: with the most passes and
-/// twice the patience.
+/// A short splitting start if asked for, relaxation with a pass an iteration, and where that is not enough the augmented
+/// Lagrangian in turn with relaxation: moving cloth that folds is solved sooner by the first, heaps and heavy bodies on
+/// light ones by the second, which makes as many passes as it takes.
 fn automatic(
     task: &Task,
     coupled: &[bool],
@@ -161,7 +165,8 @@ fn automatic(
         splitting_start::run(task, at, task.settings.splitting_iterations, work);
     }
     let mut iterations = 0;
-    let mut control = Control { iterations_max: max, patience: PATIENCE, thorough: false };
+    let mut turn = FIRST_TURN;
+    let mut control = Control { iterations_max: max, patience: PATIENCE, passes: Passes::One };
     loop {
         control.iterations_max = max - iterations;
         let run = accelerated_relaxation::run(task, coupled, at, control, buffers, work);
@@ -170,13 +175,17 @@ fn automatic(
             return Run { iterations, ..run };
         }
         report.hand_overs += 1;
-        let run = augmented_lagrangian::run(task, at, iterations.min(max - iterations), buffers, work);
+        let run = augmented_lagrangian::run(task, at, turn.min(max - iterations), TURN_PATIENCE, buffers, work);
         iterations += run.iterations;
         if run.ending == Ending::Converged || iterations >= max {
             return Run { iterations, ..run };
         }
         report.hand_overs += 1;
-        control = Control { patience: control.patience.saturating_mul(2), thorough: true, ..control };
+        turn = turn.saturating_mul(2);
+        control = match control.passes {
+            Passes::One => Control { passes: Passes::Growing, ..control },
+            _ => Control { patience: control.patience.saturating_mul(2), passes: Passes::Many, ..control },
+        };
     }
 }
 
@@ -199,7 +208,7 @@ fn automatic_uncoupled(
             return Run { iterations, ..run };
         }
         report.hand_overs += 1;
-        let run = augmented_lagrangian::run(task, at, (2 * turn).min(max - iterations), buffers, work);
+        let run = augmented_lagrangian::run(task, at, (2 * turn).min(max - iterations), u32::MAX, buffers, work);
         iterations += run.iterations;
         if iterations >= max {
             return Run { iterations, ending: Ending::Exhausted, error: None };
@@ -225,7 +234,7 @@ fn typical_mass(problem: &ContactProblem, packed: &PackedContacts) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for (b, m) in problem.inverse_diagonal.iter().enumerate() {
         let trace = m[0][0] + m[1][1] + m[2][2];
-        if trace > 0.0 && packed.touches(b) {
+        if trace > 0.0 && packed.incidence.touches(b) {
             sum += trace / 3.0;
             count += 1.0;
         }
@@ -274,7 +283,7 @@ fn finish(
     let inverse = task.problem.inverse_diagonal;
     for (b, v) in at.dv.iter_mut().enumerate() {
         if !coupled[b] {
-            *v = mat_vec(&inverse[b], task.packed.gather(b, &forces));
+            *v = mat_vec(&inverse[b], task.packed.incidence.gather(b, &forces));
         }
     }
     let residuals = measure(task, at, buffers, work);

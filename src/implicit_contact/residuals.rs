@@ -150,7 +150,7 @@ pub(super) fn measure(task: &Task, at: &Iterate, buffers: &mut MeasureBuffers, w
     matrix.product(&at.dv, &mut buffers.product, task.par);
     task.packed.impulses(&at.p, &mut buffers.impulses, task.par);
     let impulses = &buffers.impulses;
-    task.par.map_into(&mut buffers.contact, |b| task.packed.gather(b, impulses));
+    task.par.map_into(&mut buffers.contact, |b| task.packed.incidence.gather(b, impulses));
     total.dynamics = dynamics_residual(task, &buffers.product, &buffers.contact);
     work.blocks += matrix.values.len() as u64;
     work.contacts += 2 * at.p.len() as u64;

@@ -15,7 +15,7 @@ use crate::math::{Mat3, Vec3};
 use crate::model::FrictionCone;
 
 /// No record, or no general entries.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// The normal velocity of one contact.
 #[derive(Clone, Copy, Debug, Default)]
@@ -54,7 +54,7 @@ struct Record {
 
 /// Entries of a contact with more than four, or with angular ones.
 #[derive(Clone, Debug, Default)]
-struct General {
+pub(super) struct General {
     linear: Vec<(u32, f32)>,
     angular: Vec<(u32, Quad)>,
 }
@@ -246,8 +246,9 @@ impl Screen {
     }
 }
 
+/// `W v` of a contact with at most four entries.
 #[inline(always)]
-fn seen(blocks: &[u32; 4], weights: &[f32; 4], v: &[Quad]) -> Quad {
+pub(super) fn seen(blocks: &[u32; 4], weights: &[f32; 4], v: &[Quad]) -> Quad {
     let first = v[blocks[0] as usize].scaled(weights[0]).add_scaled(weights[1], v[blocks[1] as usize]);
     let second = v[blocks[2] as usize].scaled(weights[2]).add_scaled(weights[3], v[blocks[3] as usize]);
     first + second
@@ -332,7 +333,8 @@ impl Record {
     }
 }
 
-fn general(rows: &RowSet, i: usize) -> General {
+/// The entries of row `i`, rounded.
+pub(super) fn general(rows: &RowSet, i: usize) -> General {
     let linear = rows.offsets[i] as usize..rows.offsets[i + 1] as usize;
     let angular = rows.angular_offsets[i] as usize..rows.angular_offsets[i + 1] as usize;
     General {
@@ -342,7 +344,8 @@ fn general(rows: &RowSet, i: usize) -> General {
 }
 
 impl General {
-    fn seen(&self, u: &[Quad]) -> Quad {
+    /// `W v`
+    pub fn seen(&self, u: &[Quad]) -> Quad {
         let linear = self.linear.iter().fold(Quad::default(), |s, (b, w)| s.add_scaled(*w, u[*b as usize]));
         self.angular.iter().fold(linear, |s, (b, lever)| s + u[*b as usize].cross(*lever))
     }

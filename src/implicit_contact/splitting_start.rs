@@ -24,8 +24,8 @@ fn factor(task: &Task, stiffness: impl Fn(usize) -> Option<Mat3> + Sync) -> Opti
     let fixed = |b: usize| inverse[b] == [[0.0; 3]; 3];
     let extra: Vec<Mat3> = task.par.map_indexed(inverse.len(), |b| {
         let mut sum = [[0.0; 3]; 3];
-        if !fixed(b) && task.packed.touches(b) {
-            task.packed.add_diagonal(b, &mut sum, &stiffness);
+        if !fixed(b) && task.packed.incidence.touches(b) {
+            task.packed.incidence.add_diagonal(b, &mut sum, &stiffness);
         }
         sum
     });
@@ -58,12 +58,12 @@ pub(super) fn run(task: &Task, at: &mut Iterate, iterations: u32, work: &mut Wor
     for _ in 0..iterations {
         let pulled: Vec<Vec3> = par.map_indexed(rho.len(), |c| add(at.p[c], scale(rho[c], z[c])));
         packed.impulses(&pulled, &mut forces, par);
-        par.map_into(&mut load, |b| packed.gather(b, &forces));
+        par.map_into(&mut load, |b| packed.incidence.gather(b, &forces));
         let apply = |d: &[Vec3], out: &mut [Vec3]| {
             par.map_into(&mut impulses, |c| scale(rho[c], relative_velocity(&packed.contacts[c], problem.rows, d)));
             let f = &impulses;
             let rounded = single.round(d.len(), |b| d[b], par);
-            par.map_into(out, |b| add(single.row_product(b, &rounded), packed.gather(b, f)));
+            par.map_into(out, |b| add(single.row_product(b, &rounded), packed.incidence.gather(b, f)));
         };
         let precondition = |r: &[Vec3], out: &mut [Vec3]| factor.apply(r, out, &mut buffer);
         let (steps, ending) =

@@ -21,11 +21,11 @@ impl Envelope {
     pub fn new(matrix: &BlockMatrix) -> Envelope {
         let n = matrix.rows();
         let mut order: Vec<u32> = Vec::with_capacity(n);
-        let mut seen = vec![false; n];
+        let (mut seen, mut reached) = (vec![false; n], Vec::new());
         for start in 0..n {
             if !seen[start] {
-                let far = farthest(matrix, start);
-                let far = farthest(matrix, far);
+                let far = farthest(matrix, start, &mut seen, &mut reached);
+                let far = farthest(matrix, far, &mut seen, &mut reached);
                 visit(matrix, far, &mut seen, &mut order);
             }
         }
@@ -62,11 +62,12 @@ fn row_columns(matrix: &BlockMatrix, row: usize) -> &[u32] {
     &matrix.columns[matrix.row_offsets[row]..matrix.row_offsets[row + 1]]
 }
 
-/// The last node that a breadth-first visit reaches.
-fn farthest(matrix: &BlockMatrix, start: usize) -> usize {
-    let mut order = Vec::new();
-    visit(matrix, start, &mut vec![false; matrix.rows()], &mut order);
-    order.last().map_or(start, |row| *row as usize)
+/// The last node that a breadth-first visit reaches; leaves `seen` as it was, and `reached` empty.
+fn farthest(matrix: &BlockMatrix, start: usize, seen: &mut [bool], reached: &mut Vec<u32>) -> usize {
+    visit(matrix, start, seen, reached);
+    let last = reached.last().map_or(start, |row| *row as usize);
+    reached.drain(..).for_each(|row| seen[row as usize] = false);
+    last
 }
 
 /// Appends the component of `start` breadth first, neighbours with fewer neighbours first.

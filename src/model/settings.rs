@@ -39,6 +39,25 @@ pub enum StartPolicy {
     Pass,
 }
 
+/// Parts of the method that can be left out, to measure what each is worth; the default leaves nothing out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ablation {
+    /// Pairs near at the start are contacts from the first round; otherwise continuous detection alone makes contacts
+    /// [Otaduy09, §4].
+    pub near_contacts: bool,
+    /// Rows bound the gap at the end of the step; otherwise they only forbid what is in contact to approach
+    /// [Otaduy09, §4].
+    pub position_level: bool,
+    /// Repeats at each contact of [`SolverChoice::IterativeAnticipation`] [Otaduy09, §5.5: 3].
+    pub repeats: u32,
+}
+
+impl Default for Ablation {
+    fn default() -> Self {
+        Ablation { near_contacts: true, position_level: true, repeats: 3 }
+    }
+}
+
 /// Settings of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -70,6 +89,8 @@ pub struct Settings {
     pub turn_max: f64,
     /// Certify the end state by exact predicates.
     pub certify: bool,
+    /// What is left out.
+    pub ablation: Ablation,
 }
 
 impl Default for Settings {
@@ -88,6 +109,7 @@ impl Default for Settings {
             proximity_factor: 2.0,
             turn_max: 0.5,
             certify: false,
+            ablation: Ablation::default(),
         }
     }
 }

@@ -97,6 +97,19 @@ impl Par<'_> {
         }
     }
 
+    /// Calls `f(start, block)` for disjoint blocks of [`BLOCK`] items of `data`; returns the sum of what it returns, in
+    /// the order of the blocks.
+    pub fn update_and_sum<T: Send>(&self, data: &mut [T], f: impl Fn(usize, &mut [T]) -> f64 + Sync) -> f64 {
+        match self.pool() {
+            Some(pool) if data.len() > BLOCK => {
+                let parts = data.par_chunks_mut(BLOCK).enumerate();
+                let sums: Vec<f64> = pool.install(|| parts.map(|(i, block)| f(i * BLOCK, block)).collect());
+                sums.into_iter().fold(0.0, |s, part| s + part)
+            }
+            _ => data.chunks_mut(BLOCK).enumerate().fold(0.0, |s, (i, block)| s + f(i * BLOCK, block)),
+        }
+    }
+
     /// Calls `f` for every item, items being tasks of unequal size (one body, one tree branch).
     pub fn for_each_task<T: Send>(&self, tasks: &mut [T], f: impl Fn(&mut T) + Sync) {
         match self.pool() {
