@@ -82,6 +82,7 @@ impl SettingsTable {
             proximity_factor: self.proximity_factor.unwrap_or(d.proximity_factor),
             turn_max: self.turn_max.unwrap_or(d.turn_max),
             certify: true,
+            ablation: d.ablation,
         }
     }
 }
