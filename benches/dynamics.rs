@@ -7,7 +7,7 @@
 #[allow(dead_code, unused_imports)]
 mod support;
 
-use signorini::dynamics::{Assembled, Surroundings, assemble, free_velocities};
+use signorini::dynamics::{Assembled, FreeSolver, Surroundings, assemble};
 use signorini::energy::{Damping, Forces, Pattern, SheetMaterial, SolidMaterial};
 use signorini::linalg::{Envelope, EnvelopeCholesky};
 use signorini::math::{Vec3, add_scaled};
@@ -93,14 +93,21 @@ fn main() {
         });
         let pinned = vec![false; x.len()];
         let mut steps = (0, false);
+        let mut solver = FreeSolver::default();
         let solve = best(body.copies, || {
-            let mut v = v.clone();
-            steps = free_velocities(&pattern, &out.matrix, &out.right, &pinned, &mut v, Par::Serial);
+            let v0 = &v;
+            let mut v = v0.clone();
+            let found = solver.solve(&pattern, &out.matrix, &out.right, &pinned, |i| v0[i], &mut v, Par::Serial);
+            steps = (found.1, found.2);
         });
         let envelope = Envelope::new(&out.matrix);
         let direct = best(body.copies, || {
             let mut change = out.right.clone();
-            EnvelopeCholesky::new(&out.matrix, &envelope, &pinned).unwrap().solve(&envelope, &mut change);
+            EnvelopeCholesky::new(&out.matrix, &envelope, &pinned).unwrap().solve(
+                &envelope,
+                &mut change,
+                &mut Vec::new(),
+            );
         });
         let blocks = out.matrix.columns.len();
         println!(

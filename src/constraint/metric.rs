@@ -29,6 +29,8 @@ pub struct Metric {
     pub system: Vec<u32>,
     /// Translations of what is coupled.
     pub translations: Translations,
+    /// Where the blocks of `matrix` come from.
+    sources: Sources,
 }
 
 impl Metric {
@@ -37,27 +39,30 @@ impl Metric {
     /// Errors: a host matrix whose diagonal block is not positive definite (system and row), or whose values are not
     /// finite or not symmetric. Cost: linear in blocks, plus a sort within each row of an upper-only system.
     pub fn new(model: &Model, state: &State, drives: &Drives) -> Result<Metric, StepError> {
-        let (lumped, fixed) = lumped_blocks(model, state);
-        let mut entries: Vec<(u32, u32, Mat3)> = Vec::new();
-        let mut system_of = vec![u32::MAX; model.block_count];
-        for (index, system) in drives.systems.iter().enumerate() {
-            let Some(description) = model.systems.get(index) else { break };
-            let blocks = system_blocks(model, description);
-            check_values(index, description, system)?;
-            blocks.iter().for_each(|b| system_of[*b as usize] = index as u32);
-            system_entries(description, &system.values, &blocks, &fixed, &mut entries);
+        let mut metric = Metric::default();
+        metric.assign(model, state, drives).map(|()| metric)
+    }
+
+    /// Makes this the metric at the start of a step, in the memory that it has. What follows from patterns alone is
+    /// kept while these and the infinite masses are the same. On an error it is of no use, until it is assigned again.
+    pub fn assign(&mut self, model: &Model, state: &State, drives: &Drives) -> Result<(), StepError> {
+        lumped_blocks(model, state, &mut self.lumped, &mut self.fixed);
+        let systems = drives.systems.len().min(model.systems.len());
+        for (index, system) in drives.systems[..systems].iter().enumerate() {
+            check_values(index, &model.systems[index], system)?;
         }
-        for (block, mass) in lumped.iter().enumerate() {
-            if fixed[block] || system_of[block] == u32::MAX {
-                entries.push((block as u32, block as u32, *mass));
-            }
+        if !self.sources.fit(model, systems, &self.fixed) {
+            let Metric { matrix, system, .. } = self;
+            self.sources = Sources::new(model, systems, &self.fixed, matrix, system);
+            self.uncoupled.clear();
+            self.uncoupled.extend(matrix.row_offsets.windows(2).map(|w| w[1] - w[0] == 1));
+            self.translations = Translations::new(&self.matrix, &linear_blocks(model));
         }
-        let matrix = by_rows(model.block_count, entries);
-        check_symmetry(&matrix)?;
-        let inverse_diagonal = inverse_blocks(model, &matrix, &fixed)?;
-        let uncoupled = matrix.row_offsets.windows(2).map(|w| w[1] - w[0] == 1).collect();
-        let translations = Translations::new(&matrix, &linear_blocks(model));
-        Ok(Metric { matrix, inverse_diagonal, lumped, fixed, uncoupled, system: system_of, translations })
+        self.sources.fill(drives, &self.lumped, &mut self.matrix);
+        // What the library assembled is symmetric.
+        check_symmetry(&self.matrix, &self.sources.mirror, |row| (self.system[row] as usize) < model.host_systems)?;
+        self.translations.update(&self.matrix);
+        inverse_blocks(model, &self.matrix, &self.fixed, &mut self.inverse_diagonal)
     }
 
     /// Blocks that impulses reach: those with one, and every block of a system that has one.
@@ -86,15 +91,21 @@ impl Metric {
 /// Which blocks are velocities of points: all but the angular ones of rigid bodies.
 fn linear_blocks(model: &Model) -> Vec<bool> {
     let mut linear = vec![true; model.block_count];
-    for body in model.bodies.iter().filter(|b| matches!(b.description.kind, Kind::Rigid { .. })) {
-        linear[body.blocks.start + 1] = false;
-    }
+    rigid_blocks(model).for_each(|first| linear[first + 1] = false);
     linear
 }
 
-fn lumped_blocks(model: &Model, state: &State) -> (Vec<Mat3>, Vec<bool>) {
-    let mut lumped = vec![IDENTITY; model.block_count];
-    let mut fixed = vec![false; model.block_count];
+/// First blocks of the rigid bodies.
+fn rigid_blocks(model: &Model) -> impl Iterator<Item = usize> + '_ {
+    let rigid = model.bodies.iter().filter(|b| matches!(b.description.kind, Kind::Rigid { .. }));
+    rigid.map(|b| b.blocks.start)
+}
+
+fn lumped_blocks(model: &Model, state: &State, lumped: &mut Vec<Mat3>, fixed: &mut Vec<bool>) {
+    lumped.clear();
+    lumped.resize(model.block_count, IDENTITY);
+    fixed.clear();
+    fixed.resize(model.block_count, false);
     for (index, body) in model.bodies.iter().enumerate() {
         let first = body.blocks.start;
         match &body.description.kind {
@@ -118,13 +129,12 @@ fn lumped_blocks(model: &Model, state: &State) -> (Vec<Mat3>, Vec<bool>) {
             Kind::Kinematic { .. } | Kind::HalfSpace(_) => {}
         }
     }
-    (lumped, fixed)
 }
 
 /// Global blocks of a system, in its row order.
-fn system_blocks(model: &Model, description: &SystemDescription) -> Vec<u32> {
+fn system_blocks<'a>(model: &'a Model, description: &'a SystemDescription) -> impl Iterator<Item = u32> + 'a {
     let bodies = description.bodies.iter().filter_map(|key| model.body_index(*key));
-    bodies.flat_map(|b| model.bodies[b].blocks.clone()).map(|b| b as u32).collect()
+    bodies.flat_map(|b| model.bodies[b].blocks.clone()).map(|b| b as u32)
 }
 
 fn check_values(index: usize, description: &SystemDescription, system: &System) -> Result<(), StepError> {
@@ -138,77 +148,134 @@ fn check_values(index: usize, description: &SystemDescription, system: &System) 
     }
 }
 
+/// Mark of a lumped block among the systems.
+const LUMPED: u32 = u32::MAX;
+
+/// Where a block of the matrix is read from.
+#[derive(Clone, Copy, Debug)]
+struct Source {
+    /// System, or [`LUMPED`].
+    system: u32,
+    /// Position among the values of the system, or among the lumped blocks.
+    position: u32,
+    /// Whether the mirrored block was given.
+    transposed: bool,
+}
+
+/// What the blocks of the matrix are made of, and what that follows from.
+#[derive(Clone, Debug, Default)]
+struct Sources {
+    list: Vec<Source>,
+    /// Position of the mirror of each block.
+    mirror: Vec<u32>,
+    fixed: Vec<bool>,
+    /// Global blocks and pattern of each system.
+    systems: Vec<(Vec<u32>, SystemDescription)>,
+    /// First blocks of the rigid bodies.
+    rigid: Vec<usize>,
+}
+
+impl Sources {
+    /// Whether they are those of the first `systems` of a model with these infinite masses.
+    fn fit(&self, model: &Model, systems: usize, fixed: &[bool]) -> bool {
+        let same = |(known, given): (&(Vec<u32>, SystemDescription), &SystemDescription)| {
+            known.1.upper == given.upper
+                && known.1.row_offsets == given.row_offsets
+                && known.1.columns == given.columns
+                && system_blocks(model, given).eq(known.0.iter().copied())
+        };
+        !self.list.is_empty()
+            && self.fixed == fixed
+            && self.systems.len() == systems
+            && rigid_blocks(model).eq(self.rigid.iter().copied())
+            && self.systems.iter().zip(&model.systems).all(same)
+    }
+
+    /// The sources of the first `systems` of a model; writes the pattern of the matrix, and the system of each block.
+    fn new(
+        model: &Model,
+        systems: usize,
+        fixed: &[bool],
+        matrix: &mut BlockMatrix,
+        system_of: &mut Vec<u32>,
+    ) -> Sources {
+        system_of.clear();
+        system_of.resize(model.block_count, u32::MAX);
+        let mut entries: Vec<(u32, u32, Source)> = Vec::new();
+        let mut out = Sources { fixed: fixed.to_vec(), rigid: rigid_blocks(model).collect(), ..Sources::default() };
+        for (index, description) in model.systems[..systems].iter().enumerate() {
+            let blocks: Vec<u32> = system_blocks(model, description).collect();
+            blocks.iter().for_each(|b| system_of[*b as usize] = index as u32);
+            system_entries(index as u32, description, &blocks, fixed, &mut entries);
+            out.systems.push((blocks, description.clone()));
+        }
+        for block in 0..model.block_count as u32 {
+            if fixed[block as usize] || system_of[block as usize] == u32::MAX {
+                entries.push((block, block, Source { system: LUMPED, position: block, transposed: false }));
+            }
+        }
+        entries.sort_by_key(|(row, column, _)| (*row, *column));
+        let pairs: Vec<(u32, u32)> = entries.iter().flat_map(|(r, c, _)| [(*r, *c), (*c, *r)]).collect();
+        *matrix = BlockMatrix::from_places(model.block_count, pairs);
+        // A mirror that a system does not give is a block of zeros, which the test of symmetry sees.
+        let missing = Source { system: LUMPED, position: u32::MAX, transposed: false };
+        out.list = vec![missing; matrix.columns.len()];
+        for (row, column, source) in entries {
+            out.list[matrix.place(row, column)] = source;
+        }
+        out.mirror = (0..model.block_count as u32)
+            .flat_map(|row| {
+                let columns = &matrix.columns[matrix.row_offsets[row as usize]..matrix.row_offsets[row as usize + 1]];
+                columns.iter().map(move |column| (row, *column))
+            })
+            .map(|(row, column)| matrix.place(column, row) as u32)
+            .collect();
+        out
+    }
+
+    /// Writes the blocks.
+    fn fill(&self, drives: &Drives, lumped: &[Mat3], matrix: &mut BlockMatrix) {
+        for (value, source) in matrix.values.iter_mut().zip(&self.list) {
+            let position = source.position as usize;
+            *value = match (source.system, source.transposed) {
+                (LUMPED, _) => lumped.get(position).copied().unwrap_or(ZERO_MATRIX),
+                (system, false) => drives.systems[system as usize].values[position],
+                (system, true) => transpose(&drives.systems[system as usize].values[position]),
+            };
+        }
+    }
+}
+
 fn system_entries(
+    system: u32,
     description: &SystemDescription,
-    values: &[Mat3],
     blocks: &[u32],
     fixed: &[bool],
-    entries: &mut Vec<(u32, u32, Mat3)>,
+    entries: &mut Vec<(u32, u32, Source)>,
 ) {
     for (row, a) in blocks.iter().enumerate() {
-        let slots = description.row_offsets[row]..description.row_offsets[row + 1];
-        for (column, value) in description.columns[slots.clone()].iter().zip(&values[slots]) {
-            let column = *column as usize;
+        for position in description.row_offsets[row]..description.row_offsets[row + 1] {
+            let column = description.columns[position] as usize;
             let b = blocks[column];
             if fixed[*a as usize] || fixed[b as usize] {
                 continue;
             }
-            entries.push((*a, b, *value));
+            let position = position as u32;
+            entries.push((*a, b, Source { system, position, transposed: false }));
             if description.upper && row != column {
-                entries.push((b, *a, transpose(value)));
+                entries.push((b, *a, Source { system, position, transposed: true }));
             }
         }
     }
 }
 
-/// Counting sort by row, then by column within each row.
-fn by_rows(rows: usize, entries: Vec<(u32, u32, Mat3)>) -> BlockMatrix {
-    let mut row_offsets = vec![0; rows + 1];
-    entries.iter().for_each(|e| row_offsets[e.0 as usize + 1] += 1);
-    for i in 0..rows {
-        row_offsets[i + 1] += row_offsets[i];
-    }
-    let mut next = row_offsets.clone();
-    let mut order = vec![0_usize; entries.len()];
-    for (i, e) in entries.iter().enumerate() {
-        order[next[e.0 as usize]] = i;
-        next[e.0 as usize] += 1;
-    }
-    let mut matrix = BlockMatrix {
-        columns: Vec::with_capacity(entries.len()),
-        values: Vec::with_capacity(entries.len()),
-        diagonal: vec![0; rows],
-        row_offsets,
-    };
-    for row in 0..rows {
-        let slots = &mut order[matrix.row_offsets[row]..matrix.row_offsets[row + 1]];
-        slots.sort_unstable_by_key(|i| entries[*i].1);
-        for i in slots {
-            if entries[*i].1 as usize == row {
-                matrix.diagonal[row] = matrix.values.len();
-            }
-            matrix.columns.push(entries[*i].1);
-            matrix.values.push(entries[*i].2);
-        }
-    }
-    matrix
-}
-
-fn check_symmetry(matrix: &BlockMatrix) -> Result<(), StepError> {
+fn check_symmetry(matrix: &BlockMatrix, mirror: &[u32], checked: impl Fn(usize) -> bool) -> Result<(), StepError> {
     let scale_of = |row: usize| largest(&matrix.values[matrix.diagonal[row]]);
-    // In each row, the first entry whose column has not been passed: rows come in ascending order.
-    let mut next = matrix.row_offsets.clone();
-    for row in 0..matrix.rows() {
+    for row in (0..matrix.rows()).filter(|row| checked(*row)) {
         for k in matrix.row_offsets[row]..matrix.row_offsets[row + 1] {
-            let column = matrix.columns[k] as usize;
-            let (slot, end) = (&mut next[column], matrix.row_offsets[column + 1]);
-            while *slot < end && (matrix.columns[*slot] as usize) < row {
-                *slot += 1;
-            }
-            let present = *slot < end && matrix.columns[*slot] as usize == row;
-            let mirrored = if present { transpose(&matrix.values[*slot]) } else { ZERO_MATRIX };
+            let mirrored = transpose(&matrix.values[mirror[k] as usize]);
             let difference = largest(&crate::math::mat_add(&matrix.values[k], &mat_scale(-1.0, &mirrored)));
-            if difference > ASYMMETRY * scale_of(row).max(scale_of(column)) {
+            if difference > ASYMMETRY * scale_of(row).max(scale_of(matrix.columns[k] as usize)) {
                 let message = "host matrix is not symmetric";
                 return Err(StepError::BadInput(BuildError { body: 0, index: row, value: difference, message }));
             }
@@ -221,8 +288,14 @@ fn largest(m: &Mat3) -> f64 {
     m.iter().flatten().fold(0.0, |a, v| a.max(v.abs()))
 }
 
-fn inverse_blocks(model: &Model, matrix: &BlockMatrix, fixed: &[bool]) -> Result<Vec<Mat3>, StepError> {
-    let mut inverses = vec![ZERO_MATRIX; matrix.rows()];
+fn inverse_blocks(
+    model: &Model,
+    matrix: &BlockMatrix,
+    fixed: &[bool],
+    inverses: &mut Vec<Mat3>,
+) -> Result<(), StepError> {
+    inverses.clear();
+    inverses.resize(matrix.rows(), ZERO_MATRIX);
     for block in (0..matrix.rows()).filter(|b| !fixed[*b]) {
         let diagonal = &matrix.values[matrix.diagonal[block]];
         match inverse(diagonal).filter(|_| is_positive_definite(diagonal)) {
@@ -230,13 +303,13 @@ fn inverse_blocks(model: &Model, matrix: &BlockMatrix, fixed: &[bool]) -> Result
             None => return Err(singular(model, block)),
         }
     }
-    Ok(inverses)
+    Ok(())
 }
 
 /// Names the system and its row that own a block.
 fn singular(model: &Model, block: usize) -> StepError {
     for (system, description) in model.systems.iter().enumerate() {
-        if let Some(row) = system_blocks(model, description).iter().position(|b| *b as usize == block) {
+        if let Some(row) = system_blocks(model, description).position(|b| b as usize == block) {
             return StepError::SingularSystem { system, row };
         }
     }

@@ -13,10 +13,13 @@ pub struct Translations {
     component: Vec<u32>,
     /// Inverse of the sum of all blocks of A within each component.
     inverse_masses: Vec<Mat3>,
+    /// Blocks that translate.
+    linear: Vec<bool>,
 }
 
 impl Translations {
-    /// The components of A over the blocks that `linear` marks. Cost: linear in the entries of A.
+    /// The components of a pattern over the blocks that `linear` marks; masses follow by [`Translations::update`]. Cost:
+    /// linear in the entries of A.
     pub fn new(matrix: &BlockMatrix, linear: &[bool]) -> Translations {
         let rows = matrix.rows();
         let entries = |row: usize| matrix.row_offsets[row]..matrix.row_offsets[row + 1];
@@ -32,20 +35,30 @@ impl Translations {
         }
         let mut component = vec![NONE; rows];
         let mut number_of_root = vec![NONE; rows];
-        let mut masses: Vec<Mat3> = Vec::new();
+        let mut count = 0;
         for row in (0..rows).filter(|row| linear[*row] && entries(*row).len() > 1) {
             let number = &mut number_of_root[root(&mut parent, row as u32) as usize];
             if *number == NONE {
-                *number = masses.len() as u32;
-                masses.push(ZERO_MATRIX);
+                *number = count;
+                count += 1;
             }
             component[row] = *number;
-            let mass = &mut masses[*number as usize];
-            for k in entries(row).filter(|k| linear[matrix.columns[*k] as usize]) {
-                *mass = mat_add(mass, &matrix.values[k]);
+        }
+        Translations { component, inverse_masses: vec![ZERO_MATRIX; count as usize], linear: linear.to_vec() }
+    }
+
+    /// Sums the masses of the components, from a matrix of this pattern. Cost: a pass over its entries.
+    pub fn update(&mut self, matrix: &BlockMatrix) {
+        self.inverse_masses.fill(ZERO_MATRIX);
+        for (row, component) in self.component.iter().enumerate().filter(|(_, c)| **c != NONE) {
+            let mass = &mut self.inverse_masses[*component as usize];
+            for k in matrix.row_offsets[row]..matrix.row_offsets[row + 1] {
+                if self.linear[matrix.columns[k] as usize] {
+                    *mass = mat_add(mass, &matrix.values[k]);
+                }
             }
         }
-        Translations { component, inverse_masses: masses.iter().map(|m| inverse(m).unwrap_or(ZERO_MATRIX)).collect() }
+        self.inverse_masses.iter_mut().for_each(|m| *m = inverse(m).unwrap_or(ZERO_MATRIX));
     }
 
     /// Adds to each component's `dv` the translation that makes `A dv` and the impulses sum up to the same; the largest
@@ -108,7 +121,8 @@ mod tests {
     #[test]
     fn components_gain_what_impulses_give() {
         let a = chains();
-        let modes = Translations::new(&a, &[true; 5]);
+        let mut modes = Translations::new(&a, &[true; 5]);
+        modes.update(&a);
         let impulses = [[1.0, 0.0, 2.0], [0.5, 0.0, 0.0], [7.0; 3], [0.0, -3.0, 0.0], [0.0; 3]];
         let mut dv = vec![[0.1, 0.2, 0.3], [0.0; 3], [9.0; 3], [-0.4, 0.0, 0.0], [1.0, 1.0, 1.0]];
         let largest = modes.balance(&a, &impulses, &mut dv);
@@ -124,7 +138,8 @@ mod tests {
     #[test]
     fn angular_blocks_do_not_translate() {
         let a = chains();
-        let modes = Translations::new(&a, &[true, true, true, false, true]);
+        let mut modes = Translations::new(&a, &[true, true, true, false, true]);
+        modes.update(&a);
         let mut dv = vec![[0.0; 3]; 5];
         modes.balance(&a, &[[7.0, 0.0, 0.0]; 5], &mut dv);
         assert_eq!(dv[3], [0.0; 3]);

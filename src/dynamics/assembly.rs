@@ -1,7 +1,9 @@
 //! The matrix and right side of a deformable body's step.
 
-use crate::energy::{Blocks, Elements, Forces, HessianForm, Pattern, Places, Stencil, TargetSpring};
+use crate::energy::{Elements, Forces, LANES, Pattern, Places, SideBySide, Stencil, TargetSpring};
 use crate::linalg::BlockMatrix;
+use crate::math::simd::points::gather;
+use crate::math::simd::{Kernel, run_wide};
 use crate::math::{IDENTITY, Mat3, Vec3, ZERO_MATRIX, add_scaled, mat_add, mat_scale, mat_vec};
 use crate::parallel::Par;
 
@@ -43,18 +45,21 @@ pub fn assemble(
     par: Par,
 ) {
     let Assembled { matrix, right } = out;
-    matrix.clone_from(&pattern.matrix);
-    matrix.values.resize(matrix.columns.len(), ZERO_MATRIX);
+    let BlockMatrix { row_offsets, columns, diagonal, .. } = &pattern.matrix;
+    matrix.row_offsets.clone_from(row_offsets);
+    matrix.columns.clone_from(columns);
+    matrix.diagonal.clone_from(diagonal);
+    matrix.values.clear();
+    matrix.values.resize(columns.len(), ZERO_MATRIX);
     let BlockMatrix { values, diagonal, .. } = matrix;
     right.clear();
     right.resize(masses.len(), [0.0; 3]);
-    forces.add_elastic_forces(x, right);
     let damping = forces.damping;
     let (stretch, bend) = (dt * damping.stretch_time, dt * damping.bending_time);
-    add_matrices(&forces.springs, &pattern.springs, x, (dt * dt, stretch), values, par);
-    add_matrices(&forces.membranes, &pattern.membranes, x, (dt * dt, stretch), values, par);
-    add_matrices(&forces.hinges, &pattern.hinges, x, (dt * dt, bend), values, par);
-    add_matrices(&forces.tetrahedra, &pattern.tetrahedra, x, (dt * dt, stretch), values, par);
+    add_stencils(&forces.springs, &pattern.springs, x, (dt * dt, stretch), (values, right), par);
+    add_stencils(&forces.membranes, &pattern.membranes, x, (dt * dt, stretch), (values, right), par);
+    add_stencils(&forces.hinges, &pattern.hinges, x, (dt * dt, bend), (values, right), par);
+    add_stencils(&forces.tetrahedra, &pattern.tetrahedra, x, (dt * dt, stretch), (values, right), par);
     add_drag(forces, pattern, (x, v), around.wind, dt, values, right);
     for (attachment, target) in forces.attachments.iter().zip(targets) {
         let node = attachment.node as usize;
@@ -74,47 +79,93 @@ fn add_to(block: &mut Mat3, factor: f64, m: &Mat3) {
     *block = mat_add(block, &mat_scale(factor, m));
 }
 
-/// Adds `stiff H + viscous V` of every stencil.
-fn add_matrices<S: Stencil<N> + Sync, const N: usize>(
+/// Adds the forces of every stencil, and `stiff H + viscous V`, in the order of the stencils.
+fn add_stencils<S: Stencil<N> + Sync, const N: usize>(
     elements: &Elements<S, N>,
     places: &[Places<N>],
     x: &[Vec3],
-    (stiff, viscous): (f64, f64),
-    values: &mut [Mat3],
+    factors: (f64, f64),
+    (values, right): (&mut [Mat3], &mut [Vec3]),
     par: Par,
 ) {
-    let local = |i: usize| {
-        let corners = elements.gather(i, x);
-        let mut blocks = elements.stencils[i].hessian(&corners, HessianForm::Projected);
-        let damping = if viscous > 0.0 { Some(elements.stencils[i].viscosity(&corners)) } else { None };
-        for a in 0..N {
-            for b in 0..N {
-                blocks[a][b] = mat_scale(stiff, &blocks[a][b]);
-                if let Some(damping) = &damping {
-                    add_to(&mut blocks[a][b], viscous, &damping[a][b]);
-                }
-            }
-        }
-        blocks
-    };
     if let Par::Serial = par {
-        (0..elements.len()).for_each(|i| scatter(&places[i], &local(i), values));
+        run_wide(AddAll { elements, places, x, factors, values, right });
         return;
     }
     let mut start = 0;
     while start < elements.len() {
         let count = CHUNK.min(elements.len() - start);
-        let blocks: Vec<Blocks<N>> = par.map_indexed(count, |i| local(start + i));
-        (0..count).for_each(|i| scatter(&places[start + i], &blocks[i], values));
+        let groups: Vec<SideBySide<N>> = par
+            .map_indexed(count.div_ceil(LANES), |i| run_wide(Four { elements, x, factors, first: start + LANES * i }));
+        for (i, four) in groups.iter().enumerate() {
+            scatter(elements, places, start + LANES * i, four, values, right);
+        }
         start += count;
     }
 }
 
-fn scatter<const N: usize>(places: &Places<N>, blocks: &Blocks<N>, values: &mut [Mat3]) {
-    for a in 0..N {
-        for b in 0..N {
-            let value = &mut values[places[a][b] as usize];
-            *value = mat_add(value, &blocks[a][b]);
+struct Four<'a, S, const N: usize> {
+    elements: &'a Elements<S, N>,
+    x: &'a [Vec3],
+    factors: (f64, f64),
+    first: usize,
+}
+
+impl<S: Stencil<N>, const N: usize> Kernel for Four<'_, S, N> {
+    type Output = SideBySide<N>;
+    #[inline(always)]
+    fn run(self) -> SideBySide<N> {
+        let Four { elements, x, factors, first } = self;
+        // Lanes beyond the last stencil repeat it.
+        let of_lane: [usize; LANES] = std::array::from_fn(|lane| (first + lane).min(elements.len() - 1));
+        let nodes = of_lane.map(|i| elements.nodes[i].map(|node| node as usize));
+        S::side_by_side(of_lane.map(|i| &elements.stencils[i]), &gather(x, &nodes), factors.0, factors.1)
+    }
+}
+
+struct AddAll<'a, S, const N: usize> {
+    elements: &'a Elements<S, N>,
+    places: &'a [Places<N>],
+    x: &'a [Vec3],
+    factors: (f64, f64),
+    values: &'a mut [Mat3],
+    right: &'a mut [Vec3],
+}
+
+impl<S: Stencil<N>, const N: usize> Kernel for AddAll<'_, S, N> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let AddAll { elements, places, x, factors, values, right } = self;
+        for first in (0..elements.len()).step_by(LANES) {
+            let four = Four { elements, x, factors, first }.run();
+            scatter(elements, places, first, &four, values, right);
+        }
+    }
+}
+
+#[inline(always)]
+fn scatter<S, const N: usize>(
+    elements: &Elements<S, N>,
+    places: &[Places<N>],
+    first: usize,
+    four: &SideBySide<N>,
+    values: &mut [Mat3],
+    right: &mut [Vec3],
+) {
+    for (lane, (nodes, places)) in elements.nodes[first..].iter().zip(&places[first..]).take(LANES).enumerate() {
+        for a in 0..N {
+            let force = &mut right[nodes[a] as usize];
+            (0..3).for_each(|c| force[c] += four.forces[a][c].0[lane]);
+            for b in 0..a {
+                let block = four.blocks[a][b].map(|row| row.map(|x| x.0[lane]));
+                let value = &mut values[places[a][b] as usize];
+                (0..3).for_each(|r| (0..3).for_each(|c| value[r][c] += block[r][c]));
+                let value = &mut values[places[b][a] as usize];
+                (0..3).for_each(|r| (0..3).for_each(|c| value[r][c] += block[c][r]));
+            }
+            let value = &mut values[places[a][a] as usize];
+            (0..3).for_each(|r| (0..3).for_each(|c| value[r][c] += four.blocks[a][a][r][c].0[lane]));
         }
     }
 }

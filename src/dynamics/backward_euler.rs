@@ -2,16 +2,16 @@
 
 use super::assembly::{Assembled, Surroundings, assemble};
 use super::rigid_body::free_angular_velocity;
-use crate::energy::{Forces, Pattern};
+use crate::energy::Pattern;
 use crate::kinematics::world_inertia;
-use crate::linalg::{BlockMatrix, EnvelopeCholesky, GradientBuffers, GradientEnding, conjugate_gradient};
-use crate::math::{Mat3, Vec3, add, add_scaled, inverse, lerp, mat_vec, scale, sub};
-use crate::model::{Body, Drives, Dynamics, Kind, Segment, System};
+use crate::linalg::{BlockMatrix, EnvelopeCholesky, GradientEnding, MixedGradient};
+use crate::math::{Vec3, add, add_scaled, lerp, mat_vec, scale, sub};
+use crate::model::{Drives, Dynamics, Kind, Model, Segment, System};
 use crate::parallel::Par;
 
 /// Residual of the unconstrained solve, relative to that of standing at the old velocity, in the norm of the inverse
-/// diagonal.
-pub const TOLERANCE: f64 = 1e-6;
+/// diagonal. What it leaves of the velocity change is well below what the contact solver's tolerance does.
+pub const TOLERANCE: f64 = 1e-4;
 
 /// Steps of conjugate gradients at most, per node and in all: beyond, the velocity reached is used and reported.
 const STEPS_PER_NODE: usize = 3;
@@ -23,7 +23,10 @@ const DIRECT_STEPS: usize = 40;
 /// Block products that a direct factor may cost where conjugate gradients have failed.
 const DIRECT_WORK: usize = 20_000_000;
 
-/// What a segment of a step is driven with once the library has driven its own bodies.
+/// Accelerations beyond gravity that an unconstrained solve found, by body key: where the next one starts.
+pub type Accelerations = Vec<(u64, Vec<Vec3>)>;
+
+/// What a segment of a step is driven with once the library has driven its own bodies; reused from step to step.
 #[derive(Clone, Debug, Default)]
 pub struct Unconstrained {
     /// The host's drives, with velocities and matrices of MODEL bodies filled in.
@@ -32,133 +35,191 @@ pub struct Unconstrained {
     pub iterations: u32,
     /// Whether every body met the tolerance.
     pub converged: bool,
+    works: Vec<BodyWork>,
 }
 
-/// A body's share of the work.
-struct Task<'a> {
-    body: &'a Body,
-    forces: &'a Forces,
-    pattern: &'a Pattern,
+/// A deformable body's share of the work: its buffers, and what its solve gave.
+#[derive(Clone, Debug, Default)]
+struct BodyWork {
+    body: usize,
     velocities: Vec<Vec3>,
+    targets: Vec<Vec3>,
     assembled: Assembled,
+    solver: FreeSolver,
+    /// Whether conjugate gradients were needed.
+    iterated: bool,
     iterations: u32,
     converged: bool,
 }
 
-/// Assembles and solves every MODEL body over the segment: `A v* = b`, linearised about the start of the segment.
-///
-/// Pinned nodes go where their script has them at the end of the segment. HOST bodies keep what the host pushed. Cost:
-/// one pass over the stencils, and the solves.
-pub fn unconstrained(segment: &Segment, par: Par) -> Unconstrained {
-    let (model, host) = (segment.model, segment.drives);
-    let mut out = Unconstrained { drives: host.clone(), iterations: 0, converged: true };
-    let mut tasks: Vec<Task> = Vec::new();
-    for (index, body) in model.bodies.iter().enumerate() {
-        match body.description.dynamics.as_deref() {
-            Some(Dynamics::Deformable { forces, pattern }) => tasks.push(Task {
-                body,
-                forces,
-                pattern,
-                velocities: Vec::new(),
-                assembled: Assembled::default(),
-                iterations: 0,
-                converged: false,
-            }),
-            Some(Dynamics::Rigid { linear_damping, angular_damping }) => {
+impl Unconstrained {
+    /// Assembles and solves every MODEL body over the segment: `A v* = b`, linearised about the start of the segment.
+    ///
+    /// Pinned nodes go where their script has them at the end of the segment. HOST bodies keep what the host pushed.
+    /// `remembered` accelerations only save iterations. Cost: one pass over the stencils, and the solves.
+    pub fn assign(&mut self, segment: &Segment, remembered: &Accelerations, par: Par) {
+        let (model, host) = (segment.model, segment.drives);
+        self.works.resize_with((0..model.bodies.len()).filter(|i| deformable(model, *i)).count(), BodyWork::default);
+        let bodies = (0..model.bodies.len()).filter(|i| deformable(model, *i));
+        self.works.iter_mut().zip(bodies).for_each(|(work, body)| work.body = body);
+        self.take_drives(host);
+        for (index, body) in model.bodies.iter().enumerate() {
+            if let Some(Dynamics::Rigid { linear_damping, angular_damping }) = body.description.dynamics.as_deref() {
                 let moved = rigid_velocity(segment, index, [*linear_damping, *angular_damping]);
-                out.drives.velocities[body.blocks.clone()].copy_from_slice(&moved);
+                self.drives.velocities[body.blocks.clone()].copy_from_slice(&moved);
             }
-            None => {}
+        }
+        par.for_each_task(&mut self.works, |work| work.run(segment, remembered, par));
+        for work in &self.works {
+            self.drives.velocities[model.bodies[work.body].blocks.clone()].copy_from_slice(&work.velocities);
+        }
+        let systems = &mut self.drives.systems[host.systems.len()..];
+        for (work, system) in self.works.iter_mut().zip(systems) {
+            std::mem::swap(&mut work.assembled.matrix.values, &mut system.values);
+        }
+        self.iterations = self.works.iter().map(|w| w.iterations).sum();
+        self.converged = self.works.iter().all(|w| w.converged);
+    }
+
+    /// The host's drives, with a place for the matrix of each deformable body behind the host's systems.
+    fn take_drives(&mut self, host: &Drives) {
+        let Drives { velocities, target_positions, target_poses, target_half_spaces, systems, attachments, .. } = host;
+        let own = &mut self.drives;
+        own.velocities.clone_from(velocities);
+        own.target_positions.clone_from(target_positions);
+        own.target_poses.clone_from(target_poses);
+        own.target_half_spaces.clone_from(target_half_spaces);
+        own.attachments.clone_from(attachments);
+        (own.gravity, own.wind) = (host.gravity, host.wind);
+        own.systems.resize_with(systems.len() + self.works.len(), System::default);
+        let (first, rest) = own.systems.split_at_mut(systems.len());
+        first.iter_mut().zip(systems).for_each(|(own, host)| own.clone_from(host));
+        for (work, system) in self.works.iter_mut().zip(rest) {
+            std::mem::swap(&mut work.assembled.matrix.values, &mut system.values);
         }
     }
-    par.for_each_task(&mut tasks, |task| task.run(segment, par));
-    for task in tasks {
-        out.drives.velocities[task.body.blocks.clone()].copy_from_slice(&task.velocities);
-        out.iterations += task.iterations;
-        out.converged &= task.converged;
-        out.drives.systems.push(System { values: task.assembled.matrix.values, ..System::default() });
+
+    /// Writes the accelerations beyond gravity of the bodies that took iterations over the segment last solved.
+    pub fn keep_accelerations(&self, segment: &Segment, out: &mut Accelerations) {
+        let mut kept = 0;
+        for work in self.works.iter().filter(|work| work.iterated) {
+            let body = &segment.model.bodies[work.body];
+            if out.len() == kept {
+                out.push((0, Vec::new()));
+            }
+            let old = &segment.start.velocities[body.blocks.clone()];
+            let acceleration =
+                |(v, u): (&Vec3, &Vec3)| sub(scale(1.0 / segment.dt, sub(*v, *u)), segment.drives.gravity);
+            out[kept].0 = body.description.key;
+            out[kept].1.clear();
+            out[kept].1.extend(work.velocities.iter().zip(old).map(acceleration));
+            kept += 1;
+        }
+        out.truncate(kept);
     }
-    out
 }
 
-impl Task<'_> {
-    fn run(&mut self, segment: &Segment, par: Par) {
-        let (body, start) = (self.body, segment.start);
+/// Whether the library drives the body, and it deforms.
+fn deformable(model: &Model, body: usize) -> bool {
+    matches!(model.bodies[body].description.dynamics.as_deref(), Some(Dynamics::Deformable { .. }))
+}
+
+impl BodyWork {
+    fn run(&mut self, segment: &Segment, remembered: &Accelerations, par: Par) {
+        let (body, start) = (&segment.model.bodies[self.body], segment.start);
         let Kind::Deformable { masses, pinned } = &body.description.kind else { return };
+        let Some(Dynamics::Deformable { forces, pattern }) = body.description.dynamics.as_deref() else { return };
+        let known = remembered.iter().find(|(key, _)| *key == body.description.key);
+        let accelerations = known.filter(|(_, a)| a.len() == body.blocks.len()).map_or(&[][..], |(_, a)| a);
+        let BodyWork { velocities: v, targets, assembled, solver, .. } = &mut *self;
         let x = &start.positions[body.nodes()];
-        let mut v = start.velocities[body.blocks.clone()].to_vec();
-        let targets = &segment.drives.attachments[body.attachments.clone()];
-        let targets: Vec<Vec3> = targets.iter().map(|[from, to]| lerp(*from, *to, segment.to)).collect();
+        let old = &start.velocities[body.blocks.clone()];
+        v.clear();
+        v.extend_from_slice(old);
+        targets.clear();
+        let moving = &segment.drives.attachments[body.attachments.clone()];
+        targets.extend(moving.iter().map(|[from, to]| lerp(*from, *to, segment.to)));
         let around = Surroundings { gravity: segment.drives.gravity, wind: segment.drives.wind };
-        let (dt, out) = (segment.dt, &mut self.assembled);
-        assemble(self.forces, self.pattern, masses, (x, &v), &targets, &around, dt, out, par);
+        let dt = segment.dt;
+        assemble(forces, pattern, masses, (x, v), targets, &around, dt, assembled, par);
         for (i, node) in body.nodes().enumerate().filter(|(i, _)| pinned[*i]) {
             let end = segment.scripted(node, segment.to);
             v[i] = scale(1.0 / dt, sub(end, x[i]));
         }
-        (self.iterations, self.converged) = free_velocities(self.pattern, &out.matrix, &out.right, pinned, &mut v, par);
-        self.velocities = v;
+        let guess = |i: usize| {
+            let beyond = accelerations.get(i).map_or(around.gravity, |a| add(*a, around.gravity));
+            add_scaled(old[i], dt, beyond)
+        };
+        let found = solver.solve(pattern, &assembled.matrix, &assembled.right, pinned, guess, v, par);
+        (self.iterated, self.iterations, self.converged) = found;
     }
 }
 
-/// Solves `A v = b` for the nodes that are not `pinned`, from the given `v`, which the pinned keep; steps of conjugate
-/// gradients made, and whether the residual fell to [`TOLERANCE`] of what it was.
-///
-/// A direct factor where it costs no more than 40 steps of conjugate gradients would, and where those do not
-/// get there if its envelope is of moderate size; else conjugate gradients with the inverse diagonal blocks. A matrix
-/// that is not positive definite leaves what was reached.
-pub fn free_velocities(
-    pattern: &Pattern,
-    matrix: &BlockMatrix,
-    right: &[Vec3],
-    pinned: &[bool],
-    v: &mut [Vec3],
-    par: Par,
-) -> (u32, bool) {
-    let free = |i: usize, f: Vec3| if pinned[i] { [0.0; 3] } else { f };
-    let residual = par.map_indexed(v.len(), |i| free(i, sub(right[i], matrix.row_product(i, v))));
-    let (envelope, entries) = (&pattern.envelope, matrix.columns.len());
-    let direct = |change: &mut Vec<Vec3>| {
-        let Some(factor) = EnvelopeCholesky::new(matrix, envelope, pinned) else { return false };
-        change.clone_from(&residual);
-        factor.solve(envelope, change);
-        true
-    };
-    let mut change = vec![[0.0; 3]; v.len()];
-    let (mut steps, mut converged) = (0, false);
-    // A product of blocks is three products with a vector.
-    let cheap = 3 * envelope.work() <= DIRECT_STEPS * entries;
-    if cheap {
-        converged = direct(&mut change);
-    }
-    if !converged {
-        (steps, converged) = iterate(matrix, &residual, pinned, &mut change, par);
-        if !converged && !cheap && envelope.work() <= DIRECT_WORK {
-            converged = direct(&mut change);
+/// Buffers of the solve of one body; capacity only.
+#[derive(Clone, Debug, Default)]
+pub struct FreeSolver {
+    gradient: MixedGradient,
+    factor: EnvelopeCholesky,
+    change: Vec<Vec3>,
+    buffer: Vec<Vec3>,
+}
+
+impl FreeSolver {
+    /// Solves `A v = b` for the nodes that are not `pinned`, until the residual is [`TOLERANCE`] of that of the given `v`:
+    /// whether it took conjugate gradients, their steps, and whether it got there. Pinned nodes keep their `v`.
+    ///
+    /// A direct factor where it costs no more than 40 steps of conjugate gradients would, and where those do not
+    /// get there if its envelope is of moderate size; else conjugate gradients with the inverse diagonal blocks, from
+    /// `guess`. A matrix that is not positive definite leaves what was reached.
+    pub fn solve(
+        &mut self,
+        pattern: &Pattern,
+        matrix: &BlockMatrix,
+        right: &[Vec3],
+        pinned: &[bool],
+        guess: impl Fn(usize) -> Vec3,
+        v: &mut [Vec3],
+        par: Par,
+    ) -> (bool, u32, bool) {
+        let envelope = &pattern.envelope;
+        // A product of blocks is three products with a vector.
+        let cheap = 3 * envelope.work() <= DIRECT_STEPS * matrix.columns.len();
+        if cheap && self.direct(pattern, matrix, right, pinned, v, par) {
+            return (false, 0, true);
         }
+        self.gradient.prepare(matrix, pinned, par);
+        let target = TOLERANCE * TOLERANCE * self.gradient.residual_squared(matrix, right, v, par);
+        (0..v.len()).filter(|i| !pinned[*i]).for_each(|i| v[i] = guess(i));
+        let steps_max = (STEPS_PER_NODE * pinned.len() + 10).min(STEPS_MAX) as u32;
+        let (steps, ending) = self.gradient.solve(matrix, right, v, (target, steps_max), par);
+        let mut converged = ending == GradientEnding::Converged;
+        if !converged && !cheap && envelope.work() <= DIRECT_WORK {
+            converged = self.direct(pattern, matrix, right, pinned, v, par);
+        }
+        (true, steps, converged)
     }
-    v.iter_mut().zip(&change).for_each(|(v, d)| *v = add(*v, *d));
-    (steps, converged)
-}
 
-/// Conjugate gradients from zero.
-fn iterate(matrix: &BlockMatrix, residual: &[Vec3], pinned: &[bool], change: &mut [Vec3], par: Par) -> (u32, bool) {
-    let inverse_diagonal: Vec<Mat3> = par.map_indexed(pinned.len(), |i| {
-        if pinned[i] { [[0.0; 3]; 3] } else { inverse(matrix.diagonal_block(i)).unwrap_or([[0.0; 3]; 3]) }
-    });
-    let free = |i: usize, f: Vec3| if pinned[i] { [0.0; 3] } else { f };
-    let steps_max = (STEPS_PER_NODE * pinned.len() + 10).min(STEPS_MAX) as u32;
-    let (steps, ending) = conjugate_gradient(
-        |d, out| par.map_into(out, |i| free(i, matrix.row_product(i, d))),
-        |r, out| par.map_into(out, |i| mat_vec(&inverse_diagonal[i], r[i])),
-        residual,
-        change,
-        true,
-        (TOLERANCE, steps_max),
-        &mut GradientBuffers::default(),
-        par,
-    );
-    (steps, ending == GradientEnding::Converged)
+    /// By the direct factor; whether there is one.
+    fn direct(
+        &mut self,
+        pattern: &Pattern,
+        matrix: &BlockMatrix,
+        right: &[Vec3],
+        pinned: &[bool],
+        v: &mut [Vec3],
+        par: Par,
+    ) -> bool {
+        if !self.factor.assign(matrix, &pattern.envelope, pinned) {
+            return false;
+        }
+        self.change.resize(v.len(), [0.0; 3]);
+        let start = &*v;
+        let residual = |i: usize| sub(right[i], matrix.row_product(i, start));
+        par.map_into(&mut self.change, |i| if pinned[i] { [0.0; 3] } else { residual(i) });
+        self.factor.solve(&pattern.envelope, &mut self.change, &mut self.buffer);
+        v.iter_mut().zip(&self.change).for_each(|(v, d)| *v = add(*v, *d));
+        true
+    }
 }
 
 /// Linear and angular velocity of a free rigid body at the end of the segment.

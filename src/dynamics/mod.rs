@@ -9,5 +9,5 @@ mod backward_euler;
 mod rigid_body;
 
 pub use assembly::{Assembled, Surroundings, assemble};
-pub use backward_euler::{TOLERANCE, Unconstrained, free_velocities, unconstrained};
+pub use backward_euler::{Accelerations, FreeSolver, TOLERANCE, Unconstrained};
 pub use rigid_body::free_angular_velocity;

@@ -1,6 +1,8 @@
 //! Co-rotational linear tetrahedra [Mueller04].
 
+use super::side_by_side::{LANES, SideBySide};
 use super::stencil::{Blocks, HessianForm, Stencil, zero_blocks};
+use crate::math::simd::points::Point;
 use crate::math::{
     IDENTITY, Mat3, SignedSingularValues, Vec3, add, add_scaled, dot, inverse, mat_add, mat_mul, mat_scale, mat_vec,
     outer, scale, sub, transpose,
@@ -123,6 +125,11 @@ impl Stencil<4> for CorotationalTetrahedron {
             }
         }
         blocks
+    }
+
+    #[inline(always)]
+    fn side_by_side(four: [&Self; LANES], x: &[Point<LANES>; 4], stiff: f64, viscous: f64) -> SideBySide<4> {
+        super::wide_tetrahedron::evaluate(four, x, (stiff, viscous))
     }
 
     /// Kelvin-Voigt: the elastic tensor on the rate of Green's strain, `sym(F^T dF/dt)`.

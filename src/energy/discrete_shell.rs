@@ -1,6 +1,8 @@
 //! Bending of a discrete shell at one of its edges [Grinspun03].
 
+use super::side_by_side::{LANES, SideBySide};
 use super::stencil::{Blocks, HessianForm, Stencil, zero_blocks};
+use crate::math::simd::points::Point;
 use crate::math::{Vec3, add, add_scaled, cross, dot, mat_scale, norm, norm_squared, outer, scale, sub};
 use std::f64::consts::PI;
 
@@ -95,7 +97,7 @@ impl Hinge {
         Bend::new(x).map(|bend| bend.angle)
     }
 
-    fn excess(&self, angle: f64) -> f64 {
+    pub(super) fn excess(&self, angle: f64) -> f64 {
         let difference = angle - self.rest_angle;
         if difference > PI {
             difference - 2.0 * PI
@@ -135,6 +137,11 @@ impl Stencil<4> for Hinge {
             }
         }
         blocks
+    }
+
+    #[inline(always)]
+    fn side_by_side(four: [&Self; LANES], x: &[Point<LANES>; 4], stiff: f64, viscous: f64) -> SideBySide<4> {
+        super::wide_shell::hinges(four, x, (stiff, viscous))
     }
 
     fn viscosity(&self, x: &[Vec3; 4]) -> Blocks<4> {

@@ -9,6 +9,7 @@
 //! * `wind`: drag of a face
 //! * `damping`: against still space, and within the material
 //! * `forces`: all energies of one body
+//! * `side_by_side`, `wide_shell`, `wide_tetrahedron`: four elements at a time
 //! * `pattern`: which blocks of the matrix they fill
 //! * `material`: physical units to energies and masses
 
@@ -19,10 +20,13 @@ mod forces;
 mod gravity;
 mod material;
 mod pattern;
+mod side_by_side;
 mod spring;
 mod stencil;
 mod target_spring;
 mod triangle_membrane;
+mod wide_shell;
+mod wide_tetrahedron;
 mod wind;
 
 pub use corotational_tetrahedron::{CorotationalTetrahedron, lame};
@@ -32,6 +36,7 @@ pub use forces::{Attachment, Elements, Forces, ForcesFault};
 pub use gravity::Gravity;
 pub use material::{MaterialFault, SheetMaterial, SolidMaterial};
 pub use pattern::{Pattern, Places};
+pub use side_by_side::{Block, LANES, SideBySide};
 pub use spring::Spring;
 pub use stencil::{Blocks, HessianForm, Stencil};
 pub use target_spring::TargetSpring;

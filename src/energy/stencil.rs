@@ -1,5 +1,7 @@
 //! What every energy of a few nodes has in common.
 
+use super::side_by_side::{LANES, SideBySide};
+use crate::math::simd::points::Point;
 use crate::math::{Mat3, Vec3, ZERO_MATRIX, dot};
 
 /// Blocks of a matrix over the nodes of a stencil.
@@ -28,6 +30,16 @@ pub trait Stencil<const N: usize> {
     /// `V` of the internal damping force `-tau V v`, `[N/m]`: positive semi-definite, zero for every rigid motion of the
     /// nodes, and the Hessian itself at rest.
     fn viscosity(&self, x: &[Vec3; N]) -> Blocks<N>;
+
+    /// Forces, and `stiff` times the projected Hessian plus `viscous` times V, of four elements side by side: what the
+    /// assembly of a step asks for. The same as element by element up to rounding.
+    #[inline(always)]
+    fn side_by_side(four: [&Self; LANES], x: &[Point<LANES>; N], stiff: f64, viscous: f64) -> SideBySide<N>
+    where
+        Self: Sized,
+    {
+        SideBySide::one_by_one(four, x, (stiff, viscous))
+    }
 
     /// An upper bound of the largest eigenvalue of the projected Hessian at `x` `[N/m]`: with the smallest nodal mass `m`,
     /// explicit integration of this energy alone is stable for steps below `2 sqrt(m / bound)`.

@@ -1,6 +1,8 @@
 //! Constant-strain triangles in their plane: membranes of cloth and shells.
 
+use super::side_by_side::{LANES, SideBySide};
 use super::stencil::{Blocks, HessianForm, Stencil, zero_blocks};
+use crate::math::simd::points::Point;
 use crate::math::{
     IDENTITY, Mat3, Vec3, add_scaled, cross, dot, mat_add, mat_scale, norm, norm_squared, outer, scale, sub, tangents,
     transpose, unit,
@@ -152,6 +154,11 @@ impl Stencil<3> for TriangleMembrane {
             }
         }
         blocks
+    }
+
+    #[inline(always)]
+    fn side_by_side(four: [&Self; LANES], x: &[Point<LANES>; 3], stiff: f64, viscous: f64) -> SideBySide<3> {
+        super::wide_shell::membranes(four, x, (stiff, viscous))
     }
 
     /// Kelvin-Voigt: the elastic tensor on the rate of Green's strain, `sym(F^T dF/dt)`.

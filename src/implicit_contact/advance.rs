@@ -32,6 +32,8 @@ pub struct Scratch {
     pub solver: SolverScratch,
     /// Broad phase and candidates.
     pub candidates: CandidateSearch,
+    /// Dynamics and metric; taken out while a step runs.
+    driven: Driven,
 }
 
 /// Advances `state` by `dt`, driven by `drives`; the outcome is in `state`, `result` and the report.
@@ -70,9 +72,10 @@ pub fn advance_watched(
     // (2) A, b and unconstrained velocities of MODEL bodies, HOST bodies bring theirs; the metric.
     watch.ask(Phase::Dynamics, 0.0)?;
     let undivided = Segment { model, drives, step_start: state, start: state, from: 0.0, to: 1.0, dt };
-    let driven = Driven::new(&undivided, par)?;
+    let mut driven = std::mem::take(&mut scratch.driven);
+    driven.assign(&undivided, &memory.accelerations, par)?;
     let filter = BodyFilter::new(model);
-    let mut account = StepAccount::new(model, state, &driven.drives);
+    let mut account = StepAccount::new(model, state, driven.drives(drives));
     account.report.times.dynamics += lap(&mut clock);
     // (3) The start state: certified, refused, or tangled.
     watch.ask(Phase::Start, 0.0)?;
@@ -82,6 +85,8 @@ pub fn advance_watched(
     let around = Surroundings { metric: &driven.metric, filter: &filter, settings, par, watch };
     let pinch = run_parts(&around, &undivided, &driven, memory, &mut passing, scratch, &mut account)?;
     // (8) Commit and report.
+    driven.keep_accelerations(&undivided, &mut memory.accelerations);
+    scratch.driven = driven;
     commit((&filter, settings, par), model, state, memory, dt, result, &passing, scratch, &mut account);
     let mut report = account.finished_report();
     report.bytes = (memory.bytes() + scratch.candidates.bytes()) as u64;
@@ -104,9 +109,9 @@ fn run_parts(
 ) -> Result<Option<Vec<Hit>>, StepError> {
     let (settings, model) = (whole.settings, undivided.model);
     let (contacts, velocities) = (memory.contacts.clone(), memory.velocities.clone());
-    let mut warm = Memory { contacts, dt: memory.dt, velocities, certified: None };
-    let mut parts = parts_of_step(model, undivided.start, &driven.drives, settings, undivided.dt);
-    let mut passes = 0;
+    let mut warm = Memory { contacts, dt: memory.dt, velocities, ..Memory::default() };
+    let mut parts = parts_of_step(model, undivided.start, driven.drives(undivided.drives), settings, undivided.dt);
+    let (mut passes, mut again) = (0, Driven::default());
     while let Some(part) = parts.pop() {
         let share = part.to - part.from;
         let here = account.state.clone();
@@ -114,11 +119,14 @@ fn run_parts(
         let pushed = Segment { start: &here, from: part.from, to: part.to, dt, ..*undivided };
         // (1) and (2) again for a part of the step: MODEL bodies are re-assembled, HOST bodies go a part of their path.
         let mut clock = Instant::now();
-        let own = (share < 1.0 && has_own_dynamics(model)).then(|| Driven::new(&pushed, whole.par)).transpose()?;
-        let driven = own.as_ref().unwrap_or(driven);
-        let (segment, around) =
-            (Segment { drives: &driven.drives, ..pushed }, &Surroundings { metric: &driven.metric, ..*whole });
-        account.rounds.not_converged |= !driven.converged;
+        let anew = share < 1.0 && has_own_dynamics(model);
+        if anew {
+            again.assign(&pushed, &memory.accelerations, whole.par)?;
+        }
+        let driven = if anew { &again } else { driven };
+        let segment = Segment { drives: driven.drives(undivided.drives), ..pushed };
+        let around = &Surroundings { metric: &driven.metric, ..*whole };
+        account.rounds.not_converged |= !driven.converged();
         account.report.times.dynamics += lap(&mut clock);
         // (4) to (6) Contacts, rows, anticipation, continuous detection, round by round.
         let refined = refine(around, &segment, passing, &warm, scratch, &mut account.rounds)?;

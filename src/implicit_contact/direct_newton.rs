@@ -74,7 +74,7 @@ impl DirectNewton {
                 *x = [0.0; 3];
             }
         }
-        factor.solve(&self.envelope, x);
+        factor.solve(&self.envelope, x, &mut Vec::new());
         true
     }
 }

@@ -2,33 +2,50 @@
 
 use super::advance::is_within_range;
 use crate::constraint::Metric;
-use crate::dynamics::unconstrained;
+use crate::dynamics::{Accelerations, Unconstrained};
 use crate::model::{BuildError, Drives, Model, Segment, StepError};
 use crate::parallel::Par;
-use std::borrow::Cow;
 
-/// The host's drives, with unconstrained velocities and matrices of the bodies that the library drives.
-pub(super) struct Driven<'a> {
-    /// Unconstrained velocities and matrices of all bodies.
-    pub drives: Cow<'a, Drives>,
-    /// The metric that they make.
+/// What drives a segment, and the metric that it makes; reused from step to step.
+#[derive(Default)]
+pub(super) struct Driven {
+    /// Unconstrained velocities and matrices of the bodies that the library drives.
+    own: Unconstrained,
+    /// Whether there are any.
+    has_own: bool,
+    /// The metric.
     pub metric: Metric,
-    /// Whether every unconstrained solve met its tolerance.
-    pub converged: bool,
 }
 
-impl<'a> Driven<'a> {
+impl Driven {
     /// Assembles and solves MODEL bodies over the segment, whose drives are the host's; HOST bodies bring their own.
-    pub fn new(segment: &Segment<'a>, par: Par) -> Result<Driven<'a>, StepError> {
-        let (drives, converged) = if has_own_dynamics(segment.model) {
-            let own = unconstrained(segment, par);
-            check_range(segment, &own.drives)?;
-            (Cow::Owned(own.drives), own.converged)
+    pub fn assign(&mut self, segment: &Segment, remembered: &Accelerations, par: Par) -> Result<(), StepError> {
+        self.has_own = has_own_dynamics(segment.model);
+        if self.has_own {
+            self.own.assign(segment, remembered, par);
+            check_range(segment, &self.own.drives)?;
+        }
+        let drives = if self.has_own { &self.own.drives } else { segment.drives };
+        self.metric.assign(segment.model, segment.start, drives)
+    }
+
+    /// The host's drives, with unconstrained velocities and matrices of the bodies that the library drives.
+    pub fn drives<'a>(&'a self, host: &'a Drives) -> &'a Drives {
+        if self.has_own { &self.own.drives } else { host }
+    }
+
+    /// Whether every unconstrained solve met its tolerance.
+    pub fn converged(&self) -> bool {
+        !self.has_own || self.own.converged
+    }
+
+    /// What the next step's unconstrained solves start from.
+    pub fn keep_accelerations(&self, segment: &Segment, out: &mut Accelerations) {
+        if self.has_own {
+            self.own.keep_accelerations(segment, out);
         } else {
-            (Cow::Borrowed(segment.drives), true)
-        };
-        let metric = Metric::new(segment.model, segment.start, &drives)?;
-        Ok(Driven { drives, metric, converged })
+            out.clear();
+        }
     }
 }
 

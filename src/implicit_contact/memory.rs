@@ -2,6 +2,7 @@
 
 use super::constraint_set::ConstraintSet;
 use crate::contact_search::{BodyFilter, Contact, ContactKey};
+use crate::dynamics::Accelerations;
 use crate::math::{Vec3, norm, scale};
 use crate::model::{HalfSpace, Model, State};
 
@@ -25,6 +26,8 @@ pub struct Memory {
     pub dt: f64,
     /// Velocities at the end of the last step, by body key.
     pub velocities: Vec<(u64, Vec<Vec3>)>,
+    /// What the unconstrained solves of the last step found: where the next ones start.
+    pub accelerations: Accelerations,
     /// Topology and positions that were certified last.
     pub certified: Option<Certified>,
 }
@@ -93,7 +96,7 @@ impl Memory {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.contacts.len() * std::mem::size_of::<RememberedContact>()
-            + self.velocities.iter().map(|(_, v)| 24 * v.len() + 32).sum::<usize>()
+            + self.velocities.iter().chain(&self.accelerations).map(|(_, v)| 24 * v.len() + 32).sum::<usize>()
             + self.certified.as_ref().map_or(0, |c| 24 * c.positions.len() + 32 * c.half_spaces.len())
     }
 }

@@ -98,7 +98,15 @@ impl EnvelopeCholesky {
     ///
     /// `None` where it is not positive definite. Cost: [`Envelope::work`].
     pub fn new(matrix: &BlockMatrix, envelope: &Envelope, fixed: &[bool]) -> Option<EnvelopeCholesky> {
-        let mut values: Vec<Mat3> = vec![[[0.0; 3]; 3]; envelope.len()];
+        let mut factor = EnvelopeCholesky::default();
+        factor.assign(matrix, envelope, fixed).then_some(factor)
+    }
+
+    /// Makes this the factor of `matrix` as [`EnvelopeCholesky::new`], in the memory that it has; whether there is one.
+    pub fn assign(&mut self, matrix: &BlockMatrix, envelope: &Envelope, fixed: &[bool]) -> bool {
+        let values = &mut self.values;
+        values.clear();
+        values.resize(envelope.len(), [[0.0; 3]; 3]);
         for p in 0..envelope.order.len() {
             let row = envelope.order[p] as usize;
             let (first, start) = (envelope.first[p] as usize, envelope.offsets[p]);
@@ -119,15 +127,17 @@ impl EnvelopeCholesky {
             for block in &own[..p - first] {
                 pivot = mat_add(&pivot, &mat_scale(-1.0, &mat_mul(block, &transpose(block))));
             }
-            own[p - first] = inverse_factor(&pivot)?;
+            let Some(inverse) = inverse_factor(&pivot) else { return false };
+            own[p - first] = inverse;
         }
-        Some(EnvelopeCholesky { values })
+        true
     }
 
-    /// `x := A^-1 x`. Cost: two passes over the factor.
-    pub fn solve(&self, envelope: &Envelope, x: &mut [Vec3]) {
+    /// `x := A^-1 x`; `y` is a buffer. Cost: two passes over the factor.
+    pub fn solve(&self, envelope: &Envelope, x: &mut [Vec3], y: &mut Vec<Vec3>) {
         let n = envelope.order.len();
-        let mut y: Vec<Vec3> = envelope.order.iter().map(|row| x[*row as usize]).collect();
+        y.clear();
+        y.extend(envelope.order.iter().map(|row| x[*row as usize]));
         for p in 0..n {
             let (first, start) = (envelope.first[p] as usize, envelope.offsets[p]);
             for q in first..p {
@@ -142,7 +152,7 @@ impl EnvelopeCholesky {
                 y[q] = sub(y[q], mat_transpose_vec(&self.values[start + q - first], y[p]));
             }
         }
-        envelope.order.iter().zip(y).for_each(|(row, y)| x[*row as usize] = y);
+        envelope.order.iter().zip(y).for_each(|(row, y)| x[*row as usize] = *y);
     }
 }
 
@@ -234,7 +244,7 @@ mod tests {
         let exact: Vec<Vec3> = (0..65).map(|i| [f64::from(i), 1.0, (f64::from(i)).sin()]).collect();
         let mut x: Vec<Vec3> = (0..65).map(|i| matrix.row_product(i, &exact)).collect();
         let factor = EnvelopeCholesky::new(&matrix, &envelope, &[false; 65]).unwrap();
-        factor.solve(&envelope, &mut x);
+        factor.solve(&envelope, &mut x, &mut Vec::new());
         assert!((0..65).all(|i| norm(sub(x[i], exact[i])) < 1e-8), "{x:?}");
     }
 
@@ -246,7 +256,7 @@ mod tests {
         let exact: Vec<Vec3> = (0..17).map(|i| if fixed[i] { [0.0; 3] } else { [1.0, i as f64, -2.0] }).collect();
         let rhs = |i: usize| if fixed[i] { [7.0; 3] } else { matrix.row_product(i, &exact) };
         let mut x: Vec<Vec3> = (0..17).map(rhs).collect();
-        EnvelopeCholesky::new(&matrix, &envelope, &fixed).unwrap().solve(&envelope, &mut x);
+        EnvelopeCholesky::new(&matrix, &envelope, &fixed).unwrap().solve(&envelope, &mut x, &mut Vec::new());
         for i in 0..17 {
             let wanted = if fixed[i] { [7.0; 3] } else { exact[i] };
             assert!(norm(sub(x[i], wanted)) < 1e-9, "{i}: {:?}", x[i]);

@@ -4,6 +4,7 @@
 //! * `single_precision`: the same in f32, for increments
 //! * `gauss_seidel`: block relaxation
 //! * `conjugate_gradient`: preconditioned conjugate gradients
+//! * `mixed_gradient`: the same in single precision, renewed in double
 //! * `incomplete_cholesky`: a preconditioner
 //! * `envelope_cholesky`: a direct factor, for small or narrow matrices
 //! * `colouring`: groups of items that share no block
@@ -14,6 +15,7 @@ mod conjugate_gradient;
 mod envelope_cholesky;
 mod gauss_seidel;
 mod incomplete_cholesky;
+mod mixed_gradient;
 mod single_precision;
 
 pub use block_matrix::BlockMatrix;
@@ -22,4 +24,5 @@ pub use conjugate_gradient::{GradientBuffers, GradientEnding, conjugate_gradient
 pub use envelope_cholesky::{Envelope, EnvelopeCholesky};
 pub use gauss_seidel::gauss_seidel_sweep;
 pub use incomplete_cholesky::IncompleteCholesky;
+pub use mixed_gradient::MixedGradient;
 pub use single_precision::{Rounded, SinglePrecision, power_of_two};

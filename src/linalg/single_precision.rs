@@ -2,8 +2,8 @@
 //! error relative to the increment, not to the solution.
 
 use super::BlockMatrix;
-use crate::math::Vec3;
-use crate::math::simd::Quad;
+use crate::math::simd::{Kernel, Quad, Width, packed_row, run_wide};
+use crate::math::{Mat3, Vec3};
 use crate::parallel::Par;
 
 /// A rounded copy of a block matrix: blocks by columns.
@@ -16,6 +16,7 @@ pub struct SinglePrecision {
     values: Vec<[f32; 9]>,
     /// Power of two that brings the largest entry near 1, so that no unit of mass leaves the range of f32.
     scale: f64,
+    width: Width,
 }
 
 /// A rounded vector and the power of two that it was divided by.
@@ -37,6 +38,13 @@ fn largest(v: &Vec3) -> f64 {
 impl SinglePrecision {
     /// Rounds `matrix`. Cost: one pass over the blocks.
     pub fn new(matrix: &BlockMatrix) -> SinglePrecision {
+        let mut out = SinglePrecision::default();
+        out.assign(matrix);
+        out
+    }
+
+    /// Rounds `matrix` into the memory of this one.
+    pub fn assign(&mut self, matrix: &BlockMatrix) {
         let scale = power_of_two(
             matrix
                 .diagonal
@@ -44,16 +52,15 @@ impl SinglePrecision {
                 .map(|d| matrix.values[*d].iter().map(largest).fold(0.0, f64::max))
                 .fold(0.0, f64::max),
         );
-        let r = 1.0 / scale;
-        let mut values = vec![[0.0; 9]; matrix.values.len()];
-        for (out, m) in values.iter_mut().zip(&matrix.values) {
-            for (i, entry) in out.iter_mut().enumerate() {
-                *entry = (r * m[i % 3][i / 3]) as f32;
-            }
-        }
-        let row_offsets = matrix.row_offsets.iter().map(|o| *o as u32).collect();
-        let diagonal = matrix.diagonal.iter().map(|d| *d as u32).collect();
-        SinglePrecision { row_offsets, columns: matrix.columns.clone(), diagonal, values, scale }
+        self.scale = scale;
+        self.width = Width::detect();
+        self.row_offsets.clear();
+        self.row_offsets.extend(matrix.row_offsets.iter().map(|o| *o as u32));
+        self.diagonal.clear();
+        self.diagonal.extend(matrix.diagonal.iter().map(|d| *d as u32));
+        self.columns.clone_from(&matrix.columns);
+        self.values.resize(matrix.values.len(), [0.0; 9]);
+        run_wide(RoundBlocks { values: &mut self.values, blocks: &matrix.values, factor: 1.0 / scale });
     }
 
     /// Rounds the vector `f`, relative to its largest entry: increments may be far below the range of f32.
@@ -76,12 +83,8 @@ impl SinglePrecision {
     /// Row `i` of `A x` in units of [`Self::unit`].
     #[inline(always)]
     pub fn rounded_row_product(&self, i: usize, x: &[Quad]) -> Quad {
-        let mut sums = Quad::default();
         let range = self.row_offsets[i] as usize..self.row_offsets[i + 1] as usize;
-        for (m, column) in self.values[range.clone()].iter().zip(&self.columns[range]) {
-            sums = sums + Quad::combine_packed(m, x[*column as usize]);
-        }
-        sums.padded()
+        packed_row(self.width, &self.values[range.clone()], &self.columns[range], x).padded()
     }
 
     /// `D x` for the diagonal block D of row `i`, in units of [`Self::unit`].
@@ -93,6 +96,24 @@ impl SinglePrecision {
     /// The mass, a power of two, that the rounded entries are relative to.
     pub fn unit(&self) -> f64 {
         self.scale
+    }
+}
+
+struct RoundBlocks<'a> {
+    values: &'a mut [[f32; 9]],
+    blocks: &'a [Mat3],
+    factor: f64,
+}
+
+impl Kernel for RoundBlocks<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        for (out, m) in self.values.iter_mut().zip(self.blocks) {
+            for (i, entry) in out.iter_mut().enumerate() {
+                *entry = (self.factor * m[i % 3][i / 3]) as f32;
+            }
+        }
     }
 }
 

@@ -1,8 +1,7 @@
 //! Eigenvectors of symmetric 3x3 matrices and singular values with rotations, for polar decompositions.
 
 use super::vector::{
-    IDENTITY, Mat3, Vec3, add_scaled, cross, determinant, dot, mat_mul, mat_vec, norm_squared, scale, tangents,
-    transpose, unit,
+    IDENTITY, Mat3, Vec3, add_scaled, cross, determinant, dot, mat_mul, mat_vec, norm_squared, scale, transpose, unit,
 };
 
 /// Sweeps of the Jacobi iteration; each squares what is off the diagonal, so four or five do.
@@ -82,7 +81,7 @@ impl SignedSingularValues {
         let across = add_scaled(images[1], -dot(u0, images[1]), u0);
         let least = DEGENERATE * DEGENERATE * norm_squared(images[0]);
         let u1 = unit(across).filter(|_| norm_squared(across) > least);
-        let u1 = u1.unwrap_or_else(|| closest_across(u0, v1));
+        let u1 = u1.unwrap_or_else(|| closest_across(u0, v1, v2));
         // Once more, so that rounding in a short vector does not tilt the frame.
         let u1 = unit(add_scaled(u1, -dot(u0, u1), u0)).unwrap_or(u1);
         let u2 = cross(u0, u1);
@@ -96,10 +95,12 @@ impl SignedSingularValues {
     }
 }
 
-/// The unit vector across `n` that is closest to `wanted`.
-fn closest_across(n: Vec3, wanted: Vec3) -> Vec3 {
-    let across = add_scaled(wanted, -dot(n, wanted), n);
-    unit(across).filter(|_| norm_squared(across) > 0.25).unwrap_or_else(|| tangents(n).0)
+/// The unit vector across `n` that is closest to `wanted`, or to `other` where that is nearly along `n`; the two are
+/// orthonormal.
+fn closest_across(n: Vec3, wanted: Vec3, other: Vec3) -> Vec3 {
+    let across = |v: Vec3| add_scaled(v, -dot(n, v), n);
+    let chosen = if norm_squared(across(wanted)) > 0.25 { across(wanted) } else { across(other) };
+    unit(chosen).unwrap_or(other)
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ use crate::model::{
 use std::sync::Arc;
 
 /// Version of the format that is written, and the only one that is read.
-pub const SNAPSHOT_FORMAT: u32 = 1;
+pub const SNAPSHOT_FORMAT: u32 = 2;
 
 const MAGIC: [u8; 8] = *b"SGNSNAP\0";
 
@@ -136,11 +136,12 @@ impl Archive for Memory {
         self.contacts.save(out);
         self.dt.save(out);
         self.velocities.save(out);
+        self.accelerations.save(out);
     }
 
     fn load(source: &mut Source) -> Result<Self, WorldError> {
         let (contacts, dt, velocities) = Archive::load(source)?;
-        Ok(Memory { contacts, dt, velocities, certified: None })
+        Ok(Memory { contacts, dt, velocities, accelerations: Archive::load(source)?, certified: None })
     }
 }
 
@@ -305,11 +306,12 @@ impl World {
         if !(sorted && finite && memory.dt.is_finite() && memory.dt >= 0.0) {
             return Err(damaged("the remembered contacts are out of order, or not finite").value(memory.dt));
         }
-        for (index, (body, velocities)) in memory.velocities.iter().enumerate() {
+        for (index, (body, velocities)) in memory.velocities.iter().chain(&memory.accelerations).enumerate() {
             // A body may have been removed since the step; one that is there has all its blocks.
             let fits = self.bodies.get(self.bodies.id_of_key(*body)).map_or(true, |b| b.blocks() == velocities.len());
             if !fits || !velocities.iter().all(|v| is_finite(*v)) {
-                return Err(damaged("remembered velocities do not fit their body, or are not finite").index(index));
+                return Err(damaged("remembered velocities or accelerations do not fit their body, or are not finite")
+                    .index(index));
             }
         }
         Ok(())

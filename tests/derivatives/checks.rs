@@ -1,8 +1,9 @@
 //! What is asked of a stencil at a configuration.
 
 use nalgebra::DMatrix;
-use signorini::energy::{Blocks, HessianForm, Stencil};
+use signorini::energy::{Blocks, HessianForm, LANES, Stencil};
 use signorini::kinematics::Pose;
+use signorini::math::simd::Lanes;
 use signorini::math::{Vec3, add, add_scaled, cross, mat_vec, norm, sub};
 
 /// The blocks as one matrix.
@@ -68,6 +69,51 @@ pub fn projected<S: Stencil<N>, const N: usize>(s: &S, x: &[Vec3; N], name: &str
         }
     }
     assert!(s.force(x).iter().flatten().all(|v| v.is_finite()), "{name}: force finite");
+    for (lane, (force, m)) in side_by_side(s, x, 2.0, 0.3).iter().enumerate() {
+        assert!(force.iter().flatten().all(|v| v.is_finite()), "{name}: force {lane} finite");
+        assert!(m.iter().all(|v| v.is_finite()), "{name}: matrix {lane} finite");
+        let least = m.clone().symmetric_eigen().eigenvalues.min();
+        assert!(least >= -1e-10 * largest(m), "{name}: matrix {lane} has {least}");
+    }
+}
+
+/// The configurations that [`side_by_side`] has in its lanes.
+fn lanes<const N: usize>(x: &[Vec3; N]) -> [[Vec3; N]; LANES] {
+    let step = 0.1 * extent(x);
+    [*x, moved(x, 0, 1, step), *x, moved(x, N - 1, 2, -step)]
+}
+
+/// Forces and the full matrix `stiff H + viscous V` of four configurations: `x` and some near it.
+fn side_by_side<S: Stencil<N>, const N: usize>(
+    s: &S,
+    x: &[Vec3; N],
+    stiff: f64,
+    viscous: f64,
+) -> Vec<([Vec3; N], DMatrix<f64>)> {
+    let four = lanes(x);
+    let points = std::array::from_fn(|k| [0, 1, 2].map(|c| Lanes(four.map(|x| x[k][c]))));
+    let found = S::side_by_side([s; LANES], &points, stiff, viscous);
+    let entry = |lane: usize, r: usize, c: usize| found.blocks[r / 3][c / 3][r % 3][c % 3].0[lane];
+    let matrix = |lane: usize| {
+        DMatrix::from_fn(3 * N, 3 * N, |r, c| if r / 3 >= c / 3 { entry(lane, r, c) } else { entry(lane, c, r) })
+    };
+    (0..LANES).map(|lane| (found.forces.map(|f| f.map(|c| c.0[lane])), matrix(lane))).collect()
+}
+
+/// Four elements at a time give what each gives alone.
+fn as_one_by_one<S: Stencil<N>, const N: usize>(s: &S, x: &[Vec3; N], name: &str) {
+    for (stiff, viscous) in [(1.0, 0.0), (2.0, 0.3)] {
+        for (x, (force, found)) in lanes(x).iter().zip(side_by_side(s, x, stiff, viscous)) {
+            let hessian = matrix(&s.hessian(x, HessianForm::Projected));
+            let expected = stiff * &hessian + viscous * matrix(&s.viscosity(x));
+            let error = largest(&(&found - &expected));
+            assert!(error <= 1e-7 * largest(&expected), "{name}: {error} of {}", largest(&expected));
+            let scale = largest(&hessian) * extent(x) * (1.0 + norm(x[0]) / extent(x));
+            for (f, g) in force.iter().zip(s.force(x)) {
+                assert!(norm(sub(*f, g)) <= 1e-8 * scale, "{name}: force {f:?} {g:?}");
+            }
+        }
+    }
 }
 
 /// Where the exact Hessian has no negative eigenvalue the projected one is the same.
@@ -84,6 +130,7 @@ pub fn kept_where_convex<S: Stencil<N>, const N: usize>(s: &S, x: &[Vec3; N], na
 
 /// Turned and shifted: the same energy, turned forces; no net force, no net torque, no damping of rigid motion.
 pub fn rigid_motion<S: Stencil<N>, const N: usize>(s: &S, x: &[Vec3; N], pose: &Pose, name: &str) {
+    as_one_by_one(s, x, name);
     let force = s.force(x);
     let stiffness = largest(&matrix(&s.hessian(x, HessianForm::Projected)));
     let scale = stiffness * extent(x);

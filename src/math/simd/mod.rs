@@ -11,4 +11,4 @@ pub mod points;
 mod quad;
 pub use eight::{Eight, EightKernel, run_eight};
 pub use lanes::{Kernel, Lanes, run_wide};
-pub use quad::Quad;
+pub use quad::{Quad, Width, packed_row};

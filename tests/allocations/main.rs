@@ -1,0 +1,198 @@
+//! What a step allocates once its buffers have their size, by a counting allocator: a crate of its own, because a global
+//! allocator is one per program.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use signorini::constraint::Metric;
+use signorini::dynamics::{Accelerations, Unconstrained};
+use signorini::energy::{Damping, SheetMaterial, SolidMaterial};
+use signorini::math::{IDENTITY, Vec3, mat_scale};
+use signorini::mesh::Surface;
+use signorini::mesh::TetMesh;
+use signorini::model::{
+    BodyDescription, Dynamics, HalfSpace, Kind, Material, Materials, Model, Precision, Segment, Settings,
+};
+use signorini::parallel::Par;
+use signorini::world::{BodyOptions, NodeForces, SheetDescription, SheetModel, Topology, World};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Arc;
+
+/// Counts calls that take memory.
+struct Counting;
+
+thread_local! {
+    /// Calls of this thread: tests run side by side.
+    static CALLS: Cell<u64> = const { Cell::new(0) };
+}
+
+fn count() {
+    // A thread that ends has no counter any more, and counts for nobody.
+    let _ = CALLS.try_with(|calls| calls.set(calls.get() + 1));
+}
+
+// SAFETY: everything is left to the system's allocator.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: as the caller promises.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        // SAFETY: as the caller promises.
+        unsafe { System.dealloc(at, layout) }
+    }
+
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: as the caller promises.
+        unsafe { System.realloc(at, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Allocations that `f` makes.
+fn allocations(f: impl FnOnce()) -> u64 {
+    let before = CALLS.get();
+    f();
+    CALLS.get() - before
+}
+
+fn sheet_material() -> SheetMaterial {
+    SheetMaterial {
+        density: 200.0,
+        thickness: 1e-3,
+        young_modulus: 1e6,
+        poisson_ratio: 0.3,
+        bending_stiffness: Some(1e-5),
+        flat: true,
+        rest_scale: 1.0,
+        damping: Damping { mass_rate: 1.0, stretch_time: 1e-3, bending_time: 1e-3 },
+    }
+}
+
+/// A square of `n` by `n` cells of 2 cm.
+fn grid(n: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let at = |i: u32, j: u32| j * (n + 1) + i;
+    let points = (0..=n).flat_map(|j| (0..=n).map(move |i| [0.02 * f64::from(i), 0.02 * f64::from(j), 0.0015]));
+    let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
+    let faces = cells
+        .flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]);
+    (points.collect(), faces.collect())
+}
+
+/// A cloth, which takes conjugate gradients, and a tetrahedron, which takes the direct factor.
+fn model() -> Model {
+    let (points, faces) = grid(24);
+    let material = sheet_material();
+    let masses = material.lumped_masses(&points, &faces).unwrap();
+    let count = points.len();
+    let forces = material.shell(&points, &faces).unwrap();
+    let cloth =
+        body(1, Surface::from_triangles(points, faces).unwrap(), masses, Dynamics::deformable(forces, count).unwrap());
+    let corners = vec![[0.0, 0.0, 1.0], [0.1, 0.0, 1.0], [0.0, 0.1, 1.0], [0.0, 0.0, 1.1]];
+    let mesh = TetMesh::new(corners.clone(), vec![[0, 1, 2, 3]]).unwrap();
+    let damping = sheet_material().damping;
+    let material = SolidMaterial { density: 1e3, young_modulus: 1e5, poisson_ratio: 0.3, rest_scale: 1.0, damping };
+    let dynamics = Dynamics::deformable(material.solid(&mesh).unwrap(), 4).unwrap();
+    let surface = Surface::from_triangles(corners, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).unwrap();
+    let solid = body(2, surface, mesh.lumped_masses(1e3), dynamics);
+    let mut rigid = solid.clone();
+    rigid.key = 3;
+    rigid.kind = Kind::Rigid { mass: 1.0, inertia: mat_scale(1e-3, &IDENTITY) };
+    rigid.dynamics = Some(Arc::new(Dynamics::Rigid { linear_damping: 0.0, angular_damping: 0.0 }));
+    let material = Material { friction_coefficient: 0.5, combine_rule: Default::default() };
+    Model::build(vec![cloth, solid, rigid], Materials { list: vec![material], overrides: vec![] }, vec![]).unwrap()
+}
+
+fn body(key: u64, surface: Surface, masses: Vec<f64>, dynamics: Dynamics) -> BodyDescription {
+    let pinned = vec![false; masses.len()];
+    BodyDescription {
+        key,
+        surface: Arc::new(surface),
+        kind: Kind::Deformable { masses, pinned },
+        half_thickness: Some(1e-3),
+        material: 0,
+        groups: 1,
+        mask: 1,
+        self_collision: true,
+        precision: Precision::Double,
+        embedding: None,
+        dynamics: Some(Arc::new(dynamics)),
+    }
+}
+
+/// Stages 1 and 2: assembly, both kinds of unconstrained solve, rigid motion, the metric.
+#[test]
+fn dynamics_and_metric_of_a_steady_step_allocate_nothing() {
+    let model = model();
+    let mut state = model.rest_state();
+    let mut drives = model.idle_drives(&state);
+    drives.gravity = [0.0, 0.0, -9.81];
+    let (mut own, mut metric, mut accelerations) = (Unconstrained::default(), Metric::default(), Accelerations::new());
+    let mut iterations = 0;
+    for step in 0..6 {
+        for (block, v) in state.velocities.iter_mut().enumerate() {
+            v[2] += 0.1 * f64::sin((block + step) as f64);
+        }
+        let dt = 0.004;
+        let segment =
+            Segment { model: &model, drives: &drives, step_start: &state, start: &state, from: 0.0, to: 1.0, dt };
+        let count = allocations(|| {
+            own.assign(&segment, &accelerations, Par::Serial);
+            metric.assign(&model, &state, &own.drives).unwrap();
+            own.keep_accelerations(&segment, &mut accelerations);
+        });
+        assert!(step < 2 || count == 0, "step {step}: {count}");
+        iterations += own.iterations;
+        assert!(own.converged);
+    }
+    assert!(iterations > 20, "{iterations}");
+    assert!(allocations(|| drop(vec![0_u8; 100])) > 0, "the allocator counts");
+}
+
+/// The whole step of a cloth at rest on the ground. Buffers of search, rows and contact solve are still made anew in
+/// each step: their number may not depend on how many vertices and contacts there are, nor may anything pile up.
+#[test]
+fn a_resting_step_allocates_a_bounded_number_of_times() {
+    let steady = [8, 24].map(|n| {
+        let (positions, faces) = grid(n);
+        let mut world = World::new();
+        world
+            .add_sheet(SheetDescription {
+                options: BodyOptions { half_thickness: Some(1e-3), ..BodyOptions::default() },
+                positions,
+                rest: Vec::new(),
+                topology: Topology { triangles: faces, ..Topology::default() },
+                material: sheet_material(),
+                model: SheetModel::Shell,
+                forces: NodeForces::default(),
+            })
+            .unwrap();
+        world.add_half_space(BodyOptions::default(), HalfSpace { normal: [0.0, 0.0, 1.0], offset: 0.0 }).unwrap();
+        world.set_gravity([0.0, 0.0, -9.81]).unwrap();
+        let mut step = || {
+            let report = world.step(&Settings::default(), 0.004, Par::Serial).unwrap();
+            assert!(!report.not_converged && report.intersections == Some(0));
+            report.active_contacts
+        };
+        (0..60).for_each(|_| assert!(step() <= 2 * n * n + 10 * n));
+        let mut contacts = 0;
+        let counts = [0; 4].map(|_| {
+            let mut active = 0;
+            let count = allocations(|| active = step());
+            contacts = active;
+            count
+        });
+        assert!(contacts > n * n / 2, "{contacts}");
+        *counts.iter().max().unwrap()
+    });
+    println!("allocations of a resting step of 81 and of 625 vertices: {steady:?}");
+    assert!(steady.iter().all(|count| *count <= RESTING), "{steady:?}");
+}
+
+/// Calls of the allocator that a resting step may make.
+const RESTING: u64 = 1000;
