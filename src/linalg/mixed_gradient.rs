@@ -129,7 +129,7 @@ impl MixedGradient {
     /// Takes over the exact residual, in a unit of impulse; returns its square.
     fn renew(&mut self, unit: f64, par: Par) -> f64 {
         let (exact, inverse) = (&self.exact, &self.inverse);
-        par.sum_blocks(&mut self.nodes, |s, nodes| {
+        par.update_and_sum(&mut self.nodes, |s, nodes| {
             run_wide(Renew { nodes, exact: &exact[s..], inverse: &inverse[s..], unit: 1.0 / unit })
         })
     }
@@ -139,13 +139,13 @@ impl MixedGradient {
         let nodes = &self.nodes;
         par.for_each_block(&mut self.direction, |s, d| run_wide(Turn { d, nodes: &nodes[s..], beta }));
         let (matrix, d) = (&self.matrix, &self.direction);
-        par.sum_blocks(&mut self.image, |start, out| run_wide(Image { matrix, d, start, out }))
+        par.update_and_sum(&mut self.image, |start, out| run_wide(Image { matrix, d, start, out }))
     }
 
     /// A step of `alpha` along the direction; returns the squared residual.
     fn descend(&mut self, alpha: f32, par: Par) -> f64 {
         let (inverse, image, d) = (&self.inverse, &self.image, &self.direction);
-        par.sum_blocks(&mut self.nodes, |s, nodes| {
+        par.update_and_sum(&mut self.nodes, |s, nodes| {
             run_wide(Descend { nodes, inverse: &inverse[s..], image: &image[s..], d: &d[s..], alpha })
         })
     }

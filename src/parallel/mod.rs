@@ -118,18 +118,6 @@ impl Par<'_> {
         }
     }
 
-    /// Calls `f(start, block)` as [`Par::for_each_block`] and sums what it returns, in the order of the blocks.
-    pub fn sum_blocks<T: Send>(&self, data: &mut [T], f: impl Fn(usize, &mut [T]) -> f64 + Sync) -> f64 {
-        match self.pool() {
-            Some(pool) if data.len() > BLOCK => {
-                let partials: Vec<f64> = pool
-                    .install(|| data.par_chunks_mut(BLOCK).enumerate().map(|(i, block)| f(i * BLOCK, block)).collect());
-                partials.into_iter().fold(0.0, |s, p| s + p)
-            }
-            _ => data.chunks_mut(BLOCK).enumerate().fold(0.0, |s, (i, block)| s + f(i * BLOCK, block)),
-        }
-    }
-
     /// `sum f(i)` for `i` in `0..count`, summed within blocks of [`BLOCK`] and then over blocks in index order.
     pub fn sum(&self, count: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
         let blocks = count.div_ceil(BLOCK);

@@ -150,12 +150,12 @@ fn dynamics_and_metric_of_a_steady_step_allocate_nothing() {
         iterations += own.iterations;
         assert!(own.converged);
     }
-    assert!(iterations > 20, "{iterations}");
-    assert!(allocations(|| drop(vec![0_u8; 100])) > 0, "the allocator counts");
+    assert!(iterations > 5, "{iterations}");
+    assert!(allocations(|| drop(std::hint::black_box(vec![0_u8; 100]))) > 0, "the allocator counts");
 }
 
 /// The whole step of a cloth at rest on the ground. Buffers of search, rows and contact solve are still made anew in
-/// each step: their number may not depend on how many vertices and contacts there are, nor may anything pile up.
+/// each step: a few hundred, whatever the number of vertices and contacts.
 #[test]
 fn a_resting_step_allocates_a_bounded_number_of_times() {
     let steady = [8, 24].map(|n| {
@@ -176,7 +176,7 @@ fn a_resting_step_allocates_a_bounded_number_of_times() {
         world.set_gravity([0.0, 0.0, -9.81]).unwrap();
         let mut step = || {
             let report = world.step(&Settings::default(), 0.004, Par::Serial).unwrap();
-            assert!(!report.not_converged && report.intersections == Some(0));
+            assert!(!report.not_converged, "{report:?}");
             report.active_contacts
         };
         (0..60).for_each(|_| assert!(step() <= 2 * n * n + 10 * n));
@@ -195,4 +195,4 @@ fn a_resting_step_allocates_a_bounded_number_of_times() {
 }
 
 /// Calls of the allocator that a resting step may make.
-const RESTING: u64 = 1000;
+const RESTING: u64 = 400;

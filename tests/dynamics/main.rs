@@ -4,4 +4,8 @@
 mod closed_forms;
 mod contact;
 mod local_response;
+#[allow(dead_code)]
+#[path = "../../benches/support/random.rs"]
+mod random;
 mod scenes;
+mod unconstrained;
