@@ -4,7 +4,7 @@ use super::accelerated_relaxation::{Control, Passes};
 use super::friction::project;
 use super::iterative_anticipation::{self, Inner};
 use super::packed_contacts::PackedContacts;
-use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure};
+use super::residuals::{Iterate, MeasureBuffers, Task, Work, contact_residuals, measure};
 use super::stop_test::{Ending, Run};
 use super::velocity_error::velocity_error;
 use super::{accelerated_relaxation, augmented_lagrangian, block_diagonal, full_anticipation, splitting_start};
@@ -286,7 +286,15 @@ fn finish(
             *v = mat_vec(&inverse[b], task.packed.incidence.gather(b, &forces));
         }
     }
-    let residuals = measure(task, at, buffers, work);
+    let mut residuals = measure(task, at, buffers, work);
+    if !report.converged {
+        let none = Iterate { dv: vec![[0.0; 3]; at.dv.len()], p: vec![[0.0; 3]; at.p.len()] };
+        if contact_residuals(task, &none.dv, &none.p).contact() < residuals.contact() {
+            // Worse than no response: the impulses would be the next step's warm start, and grow from step to step.
+            *at = none;
+            residuals = measure(task, at, buffers, work);
+        }
+    }
     report.complementarity_residual = residuals.normal;
     report.friction_residual = residuals.friction;
     report.dynamics_residual = residuals.dynamics;
