@@ -171,6 +171,34 @@ fn whole_states_agree_with_brute_force_and_have_points() {
     assert!(total > 1000, "{total}");
 }
 
+/// The filter before the exact predicates must leave every pair that touches: segments that end on triangles to the last
+/// bit, and corners, edges and planes of small lattices that meet exactly.
+#[test]
+fn pairs_that_touch_to_the_last_bit_agree_with_brute_force() {
+    let mut r = Random::new(24);
+    let mut x: Vec<Vec3> = Vec::new();
+    for i in 0..2000 {
+        let far = scale([0.0, 1.0, 1e6][r.pick(3)], r.vector());
+        let [a, b, c] = [0; 3].map(|_| add_scaled(far, 1.0, r.vector()));
+        let (u, v) = ([0.0, r.unit(), 0.5][r.pick(3)], [0.0, 0.25][r.pick(2)]);
+        let on = add_scaled(add_scaled(a, u, signorini::math::sub(b, a)), v, signorini::math::sub(c, a));
+        let p = [0, 1, 2].map(|k| [on[k], on[k].next_up(), on[k].next_down()][r.pick(3)]);
+        let q = add_scaled(p, 1.0, r.vector());
+        let size = 2 + i % 3;
+        let lattice = [0; 5].map(|_| [0; 3].map(|_| 0.1 * r.pick(size) as f64 - 0.3));
+        x.extend(if i % 2 == 0 { [p, q, a, b, c] } else { lattice });
+    }
+    let count = x.len() as u32 / 5;
+    let edges: Vec<[u32; 2]> = (0..count).map(|i| [5 * i, 5 * i + 1]).collect();
+    let faces: Vec<[u32; 3]> = (0..count).map(|i| [5 * i + 2, 5 * i + 3, 5 * i + 4]).collect();
+    let vertices: Vec<u32> = (0..5 * count).collect();
+    let p = signorini::detection::Primitives { vertices: &vertices, edges: &edges, faces: &faces };
+    let own = |a: u32, b: u32| a / 5 == b / 5;
+    let expected = find_brute_force(&p, &x, &own);
+    assert!(expected.len() > 300 && expected.len() < 1900, "{}", expected.len());
+    assert_eq!(find(&p, &x, &own, Par::Serial), expected);
+}
+
 fn points_are_common(scene: &Scene, x: &[Vec3], found: &[signorini::detection::intersection::Intersection]) {
     for i in found {
         let [a, b, c] = scene.faces[i.face as usize].map(|v| x[v as usize]);
