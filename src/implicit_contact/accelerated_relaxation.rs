@@ -192,9 +192,13 @@ pub(super) fn run(
                 engine.account(work);
                 return Run { iterations: k, ending: Ending::Converged, error: Some(e) };
             }
-            Verdict::Diverged => {
+            Verdict::Overflowed => {
                 engine.account(work);
-                engine = double(at, 1.5 * engine.metric_scale());
+                if let Engine::Double(_) = &engine {
+                    return Run { iterations: k, ending: Ending::Stagnated, error: None };
+                }
+                // The range of single precision was too small for these masses.
+                engine = double(at, FIRST_SCALE);
                 continue;
             }
             Verdict::Continue => {}

@@ -9,7 +9,7 @@ use super::direct_newton::DirectNewton;
 use super::friction::{project, project_tangent};
 use super::newton_system::{Acting, NewtonSystem};
 use super::packed_contacts::{contact_velocity, relative_velocity, world_stiffness};
-use super::residuals::{Iterate, MeasureBuffers, Task, Work, measure};
+use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work, measure};
 use super::stop_test::{Ending, Run, Stagnation, StopTest, Verdict};
 use crate::math::{Mat3, Vec3, add_scaled, dot, mat_add, mat_scale, mat_vec, norm, sub};
 use crate::model::FrictionCone;
@@ -18,13 +18,26 @@ use crate::parallel::BLOCK;
 /// Penalty stiffness relative to the effective mass of a contact.
 const STIFFNESS: f64 = 3.0;
 /// The same where Newton systems are factored, which stiffness does not disturb.
-const STIFFNESS_FACTORED: f64 = 100.0;
+const STIFFNESS_FACTORED: f64 = 1e4;
 /// Newton steps between two updates of the multipliers at most.
 const NEWTON_STEPS: u32 = 3;
 /// The same where they are factored.
 const NEWTON_STEPS_FACTORED: u32 = 12;
 /// Factored Newton steps go on until what they leave is this share of the contact tolerance.
-const FACTORED_SHARE: f64 = 1e-2;
+const FACTORED_SHARE: f64 = 1e-5;
+/// What Newton steps leave by rounding, relative to the velocity scale.
+const ROUNDING: f64 = 1e-11;
+/// Minima are good enough to judge once they leave this share of the contact tolerance.
+const SETTLED: f64 = 0.1;
+/// Where Newton systems are factored another update costs little: a solution goes on to this share of the contact
+/// tolerance, so that what rests leaves no velocity that the next step has to stop again.
+const POLISHED: f64 = 1e-3;
+/// Updates for that at most.
+const POLISHES: u32 = 8;
+/// Updates without a better iterate after which friction limits no longer follow all of the way.
+const CYCLE: u32 = 4;
+/// Share by which they follow then.
+const DAMPED: f64 = 0.5;
 /// Relative residual of a Newton step's linear solve, and its steps at most.
 const LINEAR_SOLVE: (f64, u32) = (0.3, 100);
 /// Slope left at a full step, relative to the first, that calls for a line search.
@@ -37,6 +50,54 @@ struct Penalty {
     stiffness: [f64; 2],
     /// Friction limit, frozen.
     bound: f64,
+}
+
+/// How far friction limits follow the normal multipliers at an update. Where friction decides how hard contacts press, all
+/// of the way can lead round in circles.
+struct Damping {
+    share: f64,
+    best: f64,
+    since: u32,
+}
+
+impl Default for Damping {
+    fn default() -> Damping {
+        Damping { share: 1.0, best: f64::INFINITY, since: 0 }
+    }
+}
+
+impl Damping {
+    fn follow(&self, from: f64, to: f64) -> f64 {
+        from + self.share * (to - from)
+    }
+
+    fn observe(&mut self, merit: f64) {
+        self.since += 1;
+        if merit < self.best {
+            self.best = merit;
+            self.since = 0;
+        } else if self.since >= CYCLE {
+            self.share = DAMPED;
+        }
+    }
+}
+
+/// Updates after the tolerances are met.
+struct Polish {
+    /// Estimated velocity error at that time.
+    error: f64,
+    merit: f64,
+    left: u32,
+}
+
+impl Polish {
+    /// Takes note of an update; whether it is for the better.
+    fn improves(&mut self, residuals: &Residuals) -> bool {
+        self.left -= 1;
+        let better = residuals.merit() < self.merit;
+        self.merit = residuals.merit();
+        better
+    }
 }
 
 struct Lagrangian<'a, 'b> {
@@ -62,6 +123,7 @@ struct Lagrangian<'a, 'b> {
 /// the other solvers.
 pub(super) fn run(
     task: &Task,
+    direct: Option<DirectNewton>,
     at: &mut Iterate,
     iterations_max: u32,
     patience: u32,
@@ -70,7 +132,6 @@ pub(super) fn run(
 ) -> Run {
     let zeros = || vec![[0.0; 3]; at.dv.len()];
     let contacts = at.p.len();
-    let direct = DirectNewton::new(task.problem);
     let relative = if direct.is_some() { STIFFNESS_FACTORED } else { STIFFNESS };
     let mut l = Lagrangian {
         task,
@@ -112,55 +173,79 @@ impl Lagrangian<'_, '_> {
     ) -> Run {
         let mut now = at.clone();
         let mut test = StopTest::new();
+        let mut damping = Damping::default();
+        let mut polish: Option<Polish> = None;
         let mut iterations = 0;
+        let factored = self.direct.is_some();
+        let tolerance = self.task.settings.contact_tolerance;
+        let exact = (FACTORED_SHARE * tolerance).max(ROUNDING) * self.task.velocity_scale;
+        // Further from a minimum, the velocities that follow from its impulses are far from those that led to them.
+        let settled = SETTLED * tolerance * self.task.velocity_scale;
         self.start(&now);
         while iterations < iterations_max {
             for (penalty, (contact, p)) in self.penalties.iter_mut().zip(self.task.packed.contacts.iter().zip(&now.p)) {
-                penalty.bound = contact.friction * p[0];
+                let bound = contact.friction * p[0];
+                let follows = iterations > 0 && *p != [0.0; 3];
+                penalty.bound = if follows { damping.follow(penalty.bound, bound) } else { bound };
             }
-            let steps = if self.direct.is_some() { NEWTON_STEPS_FACTORED } else { NEWTON_STEPS };
-            for newton in 0..steps {
-                let change = self.evaluate(&now);
-                let exact = FACTORED_SHARE * self.task.settings.contact_tolerance * self.task.velocity_scale;
-                let enough = if self.direct.is_some() { exact } else { 2.0 * change };
-                if newton > 0 && self.gradient_velocity() <= enough {
-                    break;
-                }
-                let left = iterations_max - iterations;
-                iterations += self.newton_step(left).max(1);
-                self.line_search(&mut now);
-                if iterations >= iterations_max {
-                    break;
-                }
+            iterations += self.minimise(&mut now, iterations_max - iterations, exact);
+            while factored && self.gradient_velocity() > settled && iterations < iterations_max {
+                iterations += self.minimise(&mut now, iterations_max - iterations, exact);
             }
-            self.evaluate(&now);
             now.p.fill([0.0; 3]);
             for acting in &self.system.acting {
                 now.p[acting.contact as usize] = acting.trial;
             }
             let residuals = measure(self.task, &now, buffers, &mut self.work);
             self.product.copy_from_slice(&buffers.product);
+            if let Some(polish) = &mut polish {
+                if !polish.improves(&residuals) {
+                    break;
+                }
+                at.clone_from(&now);
+                if polish.left == 0 || residuals.contact() <= POLISHED * tolerance {
+                    break;
+                }
+                continue;
+            }
+            damping.observe(residuals.merit());
+            if factored && self.gradient_velocity() > settled {
+                break;
+            }
             match test.check(self.task, &now, &residuals, at, buffers, &mut self.work) {
+                Verdict::Converged(error) if factored => {
+                    polish = Some(Polish { error, merit: residuals.merit(), left: POLISHES });
+                }
                 Verdict::Converged(e) => return Run { iterations, ending: Ending::Converged, error: Some(e) },
                 Verdict::Continue => {}
-                Verdict::Diverged => {
-                    // Softer contacts from the best iterate.
-                    self.scale_stiffness(0.3);
-                    now.clone_from(at);
-                    self.start(&now);
-                }
+                Verdict::Overflowed => return Run { iterations, ending: Ending::Stagnated, error: None },
             }
-            if stagnation.seen(residuals.merit(), iterations) {
+            if polish.is_none() && stagnation.seen(residuals.merit(), iterations) {
                 return Run { iterations, ending: Ending::Stagnated, error: None };
             }
         }
-        Run { iterations, ending: Ending::Exhausted, error: None }
+        match polish {
+            Some(polish) => Run { iterations, ending: Ending::Converged, error: Some(polish.error) },
+            None => Run { iterations, ending: Ending::Exhausted, error: None },
+        }
     }
 
-    fn scale_stiffness(&mut self, factor: f64) {
-        for penalty in &mut self.penalties {
-            penalty.stiffness = penalty.stiffness.map(|s| factor * s);
+    /// Newton steps over `dv` with the multipliers and bounds as they are; leaves the next multipliers in `trial`. Returns
+    /// the steps of the linear solves.
+    fn minimise(&mut self, now: &mut Iterate, iterations_max: u32, exact: f64) -> u32 {
+        let factored = self.direct.is_some();
+        let mut iterations = 0;
+        for newton in 0..if factored { NEWTON_STEPS_FACTORED } else { NEWTON_STEPS } {
+            let change = self.evaluate(now);
+            let enough = if factored { exact } else { 2.0 * change };
+            if (newton > 0 && self.gradient_velocity() <= enough) || iterations >= iterations_max {
+                return iterations;
+            }
+            iterations += self.newton_step(iterations_max - iterations).max(1);
+            self.line_search(now);
         }
+        self.evaluate(now);
+        iterations
     }
 
     /// What follows `dv` from step to step, at a new one.

@@ -9,6 +9,22 @@ use crate::math::{Vec3, add_scaled, dot, mat_vec, sub};
 /// Passes between two residual checks.
 const CHECK_EVERY: u32 = 8;
 
+/// Takes the velocities that follow from the impulses; whether the contact residuals are within the tolerance then.
+pub(super) fn holds(task: &Task, at: &mut Iterate, work: &mut Work) -> bool {
+    let mut impulses = Vec::new();
+    respond(task, &at.p, &mut at.dv, &mut impulses);
+    work.contacts += 2 * at.p.len() as u64;
+    contact_residuals(task, &at.dv, &at.p).contact() <= task.settings.contact_tolerance
+}
+
+/// `dv = D^-1 C^T p`
+fn respond(task: &Task, p: &[Vec3], dv: &mut Vec<Vec3>, impulses: &mut Vec<Vec3>) {
+    let (packed, inverse, par) = (task.packed, task.problem.inverse_diagonal, task.par);
+    packed.impulses(p, impulses, par);
+    let f = &*impulses;
+    par.map_into(dv, |b| mat_vec(&inverse[b], packed.incidence.gather(b, f)));
+}
+
 /// Solves in place, until the residuals and the estimated velocity error are within their tolerances.
 ///
 /// Passes are accelerated as a nonlinear conjugate gradient method [Silcowitz10]: a pass is a fixed-point map of `p`,
@@ -19,13 +35,8 @@ pub(super) fn solve(task: &Task, at: &mut Iterate, iterations_max: u32, work: &m
     let metrics = packed.metrics(problem.rows, inverse, par);
     let cone = settings.friction_cone;
     let cx = PassContext { rows: problem.rows, inverse, metrics: &metrics, cone, repeats: 1, par };
-    let respond = |p: &[Vec3], dv: &mut Vec<Vec3>, impulses: &mut Vec<Vec3>| {
-        packed.impulses(p, impulses, par);
-        let f = &*impulses;
-        par.map_into(dv, |b| mat_vec(&inverse[b], packed.incidence.gather(b, f)));
-    };
     let mut impulses = Vec::new();
-    respond(&at.p, &mut at.dv, &mut impulses);
+    respond(task, &at.p, &mut at.dv, &mut impulses);
     let count = at.p.len();
     let mut before = vec![[0.0; 3]; count];
     let mut direction = vec![[0.0; 3]; count];
@@ -39,7 +50,7 @@ pub(super) fn solve(task: &Task, at: &mut Iterate, iterations_max: u32, work: &m
         let last = iterations == iterations_max;
         if iterations % CHECK_EVERY == 1 || last {
             let mut exact = Iterate { dv: vec![[0.0; 3]; at.dv.len()], p: Vec::new() };
-            respond(&at.p, &mut exact.dv, &mut impulses);
+            respond(task, &at.p, &mut exact.dv, &mut impulses);
             let residuals = contact_residuals(task, &exact.dv, &at.p);
             work.contacts += 2 * count as u64;
             at.dv = exact.dv;
@@ -52,7 +63,7 @@ pub(super) fn solve(task: &Task, at: &mut Iterate, iterations_max: u32, work: &m
             }
         }
         accelerate(task, at, &before, &mut direction, &mut step_squared);
-        respond(&at.p, &mut at.dv, &mut impulses);
+        respond(task, &at.p, &mut at.dv, &mut impulses);
         work.contacts += count as u64;
     }
     Run { iterations, ending: Ending::Exhausted, error: None }

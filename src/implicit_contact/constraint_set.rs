@@ -1,10 +1,11 @@
 //! The set of constraints of a segment, which grows from round to round [Otaduy09, §4].
 
 use super::Memory;
+use super::friction::project;
 use crate::constraint::BuiltRows;
 use crate::contact_search::{Contact, Hit, Pair};
-use crate::math::{Vec3, dot, norm};
-use crate::model::{Model, Settings};
+use crate::math::{Vec3, dot};
+use crate::model::{FrictionCone, Model, Settings};
 
 /// Share of the required gap that an existing row may miss before a hit of its pair is blamed on the solver.
 const MISSED_SHARE: f64 = 0.05;
@@ -12,6 +13,9 @@ const MISSED_SHARE: f64 = 0.05;
 /// Contacts closer than this multiple of their thickness are rows from the start, so that a resting contact does not
 /// drop out by what its solve left over. Beyond, they are watched.
 const RESTING_SHARE: f64 = 1.1;
+
+/// Share of the friction limit within which a contact sticks.
+const WELL_WITHIN: f64 = 1.0 - 1e-6;
 
 /// What the last solve gave a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -161,32 +165,22 @@ impl ConstraintSet {
 
     /// Warm start of the rows, in their own frames.
     pub fn row_impulses(&self, built: &BuiltRows) -> Vec<Vec3> {
-        let project = |(row, contact): (usize, &u32)| {
+        let in_frame = |(row, contact): (usize, &u32)| {
             let f = self.solved[*contact as usize].impulse;
             built.rows.frames[row].map(|axis| dot(axis, f))
         };
-        let mut impulses: Vec<Vec3> = built.contact.iter().enumerate().map(project).collect();
-        for (p, mu) in impulses.iter_mut().zip(&built.rows.friction) {
-            p[0] = p[0].max(0.0);
-            let (size, limit) = ((p[1] * p[1] + p[2] * p[2]).sqrt(), mu * p[0]);
-            if size > limit {
-                p[1] *= limit / size;
-                p[2] *= limit / size;
-            }
-        }
-        impulses
+        built.contact.iter().enumerate().map(in_frame).collect()
     }
 
     /// Takes over the multipliers of a solve.
-    pub fn keep(&mut self, built: &BuiltRows, impulses: &[Vec3]) {
+    pub fn keep(&mut self, cone: FrictionCone, built: &BuiltRows, impulses: &[Vec3]) {
         self.solved.iter_mut().for_each(|s| *s = Solved::default());
         for (row, contact) in built.contact.iter().enumerate() {
             let (p, mu) = (impulses[row], built.rows.friction[row]);
-            let size = norm([0.0, p[1], p[2]]);
             self.solved[*contact as usize] = Solved {
                 impulse: built.rows.impulse(row, p),
                 tangent: built.rows.frames[row][1],
-                sticks: p[0] > 0.0 && size < (1.0 - 1e-6) * mu * p[0],
+                sticks: p[0] > 0.0 && mu > 0.0 && project(cone, WELL_WITHIN * mu, p) == p,
             };
         }
     }

@@ -55,6 +55,11 @@ impl DirectNewton {
         Some(DirectNewton { bare: matrix.values.clone(), matrix, envelope, fixed, offsets, entries })
     }
 
+    /// Block products of a factorisation.
+    pub fn work(&self) -> usize {
+        self.envelope.work()
+    }
+
     /// `x := (A + C^T E C)^-1 x` with rows of the row set and their world stiffness; whether it is positive definite.
     pub fn solve(&mut self, stiffness: impl Iterator<Item = (usize, Mat3)>, x: &mut [Vec3]) -> bool {
         self.matrix.values.copy_from_slice(&self.bare);

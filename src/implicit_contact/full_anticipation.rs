@@ -53,7 +53,7 @@ pub(super) fn run(
         match test.check(task, &now, &residuals, at, buffers, work) {
             Verdict::Converged(e) => return Run { iterations: k, ending: Ending::Converged, error: Some(e) },
             Verdict::Continue => {}
-            Verdict::Diverged => return Run { iterations: k, ending: Ending::Stagnated, error: None },
+            Verdict::Overflowed => return Run { iterations: k, ending: Ending::Stagnated, error: None },
         }
     }
     Run { iterations: iterations_max, ending: Ending::Exhausted, error: None }

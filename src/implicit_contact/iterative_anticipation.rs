@@ -5,7 +5,7 @@ use super::packed_contacts::PassContext;
 use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work, contact_residuals, measure};
 use super::stop_test::{Ending, Run, StopTest, Verdict};
 use crate::linalg::gauss_seidel_sweep;
-use crate::math::{Mat3, Vec3, add, mat_scale, mat_vec, sub};
+use crate::math::{Vec3, add, mat_vec, sub};
 
 /// Change between two iterations below which the paper stops [Otaduy09, §5.5].
 const PAPER_CHANGE: f64 = 0.05;
@@ -13,8 +13,6 @@ const PAPER_CHANGE: f64 = 0.05;
 const PAPER_PASSES: u32 = 10;
 /// Outer iterations between two checks of the stop test.
 const CHECK_EVERY: u32 = 5;
-/// Under-relaxation of the anticipation beyond which nothing more is tried.
-const SCALE_MAX: f64 = 100.0;
 
 /// The inner loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,18 +40,17 @@ pub(super) fn run(
     let mut now = at.clone();
     let mut test = StopTest::new();
     let mut predicted = vec![[0.0; 3]; at.dv.len()];
-    let (mut scale, mut before, mut paper) = (1.0, None, 0);
-    let mut scaled: Vec<Mat3> = inverse.to_vec();
-    let mut metrics = task.packed.metrics(task.problem.rows, &scaled, task.par);
+    let (mut before, mut paper) = (None, 0);
+    let metrics = task.packed.metrics(task.problem.rows, inverse, task.par);
     measure(task, &now, buffers, work);
     for k in 1..=iterations_max {
         {
-            let (q, y, dv, s) = (&buffers.contact, &buffers.product, &now.dv, &scaled);
-            task.par.map_into(&mut predicted, |b| add(dv[b], mat_vec(&s[b], sub(q[b], y[b]))));
+            let (q, y, dv) = (&buffers.contact, &buffers.product, &now.dv);
+            task.par.map_into(&mut predicted, |b| add(dv[b], mat_vec(&inverse[b], sub(q[b], y[b]))));
         }
         let repeats = if inner == Inner::Paper { task.settings.ablation.repeats.max(1) } else { 1 };
         let (rows, cone) = (task.problem.rows, task.settings.friction_cone);
-        let cx = PassContext { rows, inverse: &scaled, metrics: &metrics, cone, repeats, par: task.par };
+        let cx = PassContext { rows, inverse, metrics: &metrics, cone, repeats, par: task.par };
         relax(task, inner, &cx, &mut now.p, &mut predicted, work);
         task.packed.impulses(&now.p, &mut buffers.impulses, task.par);
         let f = &buffers.impulses;
@@ -71,16 +68,8 @@ pub(super) fn run(
         match test.check(task, &now, &residuals, at, buffers, work) {
             Verdict::Converged(e) => return (Run { iterations: k, ending: Ending::Converged, error: Some(e) }, paper),
             Verdict::Continue => {}
-            Verdict::Diverged => {
-                scale *= 1.5;
-                if scale > SCALE_MAX {
-                    return (Run { iterations: k, ending: Ending::Stagnated, error: None }, paper);
-                }
-                scaled = inverse.iter().map(|m| mat_scale(1.0 / scale, m)).collect();
-                metrics = task.packed.metrics(task.problem.rows, &scaled, task.par);
-                now.clone_from(at);
-                measure(task, &now, buffers, work);
-                before = None;
+            Verdict::Overflowed => {
+                return (Run { iterations: k, ending: Ending::Stagnated, error: None }, paper);
             }
         }
     }

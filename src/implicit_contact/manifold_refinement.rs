@@ -241,7 +241,7 @@ fn solve_round(
         SolverReport { converged: true, ..SolverReport::default() }
     };
     account.add(&report);
-    set.keep(&built, &impulses);
+    set.keep(around.settings.friction_cone, &built, &impulses);
     refined.block_impulses = block_impulses(model.block_count, &built, &impulses);
     refined.built = built;
     for block in 0..model.block_count {

@@ -275,7 +275,7 @@ impl PackedContacts {
             return [0.0; 2];
         }
         let normal = (dn * p[0]).min(w[0]).abs();
-        if contact.friction == 0.0 || p[0] == 0.0 || dt <= 0.0 {
+        if dt <= 0.0 {
             return [normal, 0.0];
         }
         let trial = [p[1] - w[1] / dt, p[2] - w[2] / dt];

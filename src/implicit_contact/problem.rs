@@ -1,6 +1,7 @@
 //! The frictional contact problem [Otaduy09, Eq. 7] over one metric, and the one signature of its solvers.
 
 use super::accelerated_relaxation::{Control, Passes};
+use super::direct_newton::DirectNewton;
 use super::friction::project;
 use super::iterative_anticipation::{self, Inner};
 use super::packed_contacts::PackedContacts;
@@ -114,6 +115,10 @@ pub fn solve(
 const FIRST_TURN: u32 = 400;
 const TURN_PATIENCE: u32 = 100;
 
+/// Block products of a factor, per contact, up to which the augmented Lagrangian goes first: it costs as much as about ten
+/// passes over the contacts then, and leaves residuals of rounding.
+const FACTORED_FIRST: usize = 64;
+
 /// Passes over uncoupled blocks before the augmented Lagrangian has its first turn.
 const UNCOUPLED_TURN: u32 = 32;
 
@@ -135,7 +140,9 @@ fn choose(
             report.paper_iterations = paper_iterations;
             run
         }
-        SolverChoice::AugmentedLagrangian => augmented_lagrangian::run(task, at, max, u32::MAX, buffers, work),
+        SolverChoice::AugmentedLagrangian => {
+            augmented_lagrangian::run(task, DirectNewton::new(task.problem), at, max, u32::MAX, buffers, work)
+        }
         SolverChoice::FullAnticipation => full_anticipation::run(task, at, max, buffers, work),
         SolverChoice::AcceleratedRelaxation => {
             let control = Control { iterations_max: max, patience: u32::MAX, passes: Passes::Growing };
@@ -175,7 +182,8 @@ fn automatic(
             return Run { iterations, ..run };
         }
         report.hand_overs += 1;
-        let run = augmented_lagrangian::run(task, at, turn.min(max - iterations), TURN_PATIENCE, buffers, work);
+        let (direct, left) = (DirectNewton::new(task.problem), turn.min(max - iterations));
+        let run = augmented_lagrangian::run(task, direct, at, left, TURN_PATIENCE, buffers, work);
         iterations += run.iterations;
         if run.ending == Ending::Converged || iterations >= max {
             return Run { iterations, ..run };
@@ -200,6 +208,17 @@ fn automatic_uncoupled(
 ) -> Run {
     let max = task.settings.iterations_max;
     let mut iterations = 0;
+    let small = |direct: &DirectNewton| direct.work() <= FACTORED_FIRST * task.packed.contacts.len();
+    if let Some(direct) = DirectNewton::new(task.problem).filter(small) {
+        let left = (2 * UNCOUPLED_TURN).min(max / 2);
+        let run = augmented_lagrangian::run(task, Some(direct), at, left, u32::MAX, buffers, work);
+        iterations += run.iterations;
+        // Velocities follow from the impulses here, and with those the contacts must hold.
+        if (run.ending == Ending::Converged && block_diagonal::holds(task, at, work)) || iterations >= max {
+            return run;
+        }
+        report.hand_overs += 1;
+    }
     let mut turn = UNCOUPLED_TURN;
     loop {
         let run = block_diagonal::solve(task, at, turn.min(max - iterations), work);
@@ -208,7 +227,8 @@ fn automatic_uncoupled(
             return Run { iterations, ..run };
         }
         report.hand_overs += 1;
-        let run = augmented_lagrangian::run(task, at, (2 * turn).min(max - iterations), u32::MAX, buffers, work);
+        let (direct, left) = (DirectNewton::new(task.problem), (2 * turn).min(max - iterations));
+        let run = augmented_lagrangian::run(task, direct, at, left, u32::MAX, buffers, work);
         iterations += run.iterations;
         if iterations >= max {
             return Run { iterations, ending: Ending::Exhausted, error: None };

@@ -75,7 +75,7 @@ impl Residuals {
 #[inline]
 fn count_contact(task: &Task, r: &mut Residuals, c: usize, dv: &[Vec3], p: Vec3) {
     let w = contact_velocity(&task.packed.contacts[c], task.problem.rows, dv);
-    if p[0] == 0.0 && w[0] >= 0.0 {
+    if p == [0.0; 3] && w[0] >= 0.0 {
         return;
     }
     let scales = task.packed.natural_scale(c, task.problem.rows, task.problem.inverse_diagonal);

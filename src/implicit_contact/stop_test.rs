@@ -3,9 +3,6 @@
 use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work};
 use super::velocity_error::velocity_error;
 
-/// Growth of the merit over the best seen that counts as divergence.
-const GROWTH: f64 = 1e3;
-
 /// How a run of a solver ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ending {
@@ -35,8 +32,8 @@ pub(super) enum Verdict {
     Converged(f64),
     /// Go on.
     Continue,
-    /// The iterate is far worse than the best: under-relax and restart from that one.
-    Diverged,
+    /// The iterate is not finite: it left the range of its numbers.
+    Overflowed,
 }
 
 /// The test, over the checks of one run.
@@ -65,8 +62,8 @@ impl StopTest {
         work: &mut Work,
     ) -> Verdict {
         let (merit, settings) = (residuals.merit(), task.settings);
-        if !merit.is_finite() || merit > GROWTH * self.best {
-            return Verdict::Diverged;
+        if !merit.is_finite() {
+            return Verdict::Overflowed;
         }
         if merit <= self.best {
             self.best = merit;

@@ -52,3 +52,27 @@ fn a_block_slides_above_the_friction_angle() {
         }
     }
 }
+
+/// The pyramid holds up to the square root of two times its limit along its diagonal. While a block sticks its pyramid
+/// stays where it was: a load that turns into the diagonal is held, one that was there from the start is not.
+#[test]
+fn the_friction_frame_is_kept_while_a_block_sticks() {
+    let load = 1.2 * 0.5 * 9.81 * 0.5_f64.sqrt();
+    for (before, holds) in [(true, true), (false, false)] {
+        let mut plan = Plan::rubbing(0.5);
+        // Flat, so that its corners bear alike.
+        let place: Vec3 = [0.0, 0.0, 0.01 + 2.0 * HALF_THICKNESS];
+        let key = plan.rigid(&block([0.4, 0.4, 0.02]), at(place), 1.0, diagonal(0.02), [0.0; 3], [0.0; 3]);
+        plan.half_space([0.0, 0.0, 1.0], 0.0);
+        let mut world = plan.build();
+        world.settings.friction_cone = signorini::model::FrictionCone::Pyramid;
+        if before {
+            world.gravity = [0.3 * 0.5 * 9.81, 0.0, -9.81];
+            (0..5).for_each(|_| drop(world.step()));
+        }
+        world.gravity = [load, load, -9.81];
+        (0..20).for_each(|_| drop(world.step()));
+        let moved = norm(sub(world.pose(key).position, place));
+        assert!(if holds { moved < 1e-4 } else { moved > 1e-2 }, "loaded before {before}: moved {moved}");
+    }
+}

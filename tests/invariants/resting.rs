@@ -5,6 +5,7 @@ use signorini::math::{norm, sub};
 
 #[test]
 fn a_stack_of_blocks_rests() {
+    let mut of_other_durations = [0; 2];
     for seed in 0..3 {
         let mut jitter = Jitter(seed);
         let mut plan = Plan::rubbing(0.6);
@@ -27,28 +28,38 @@ fn a_stack_of_blocks_rests() {
         let [kept, forgotten] = [|_: &mut World| {}, |world: &mut World| world.memory.contacts.clear()]
             .map(|change| iterations_after(&mut world, change));
         assert!(3 * kept <= 2 * forgotten, "seed {seed}: {kept} and {forgotten} iterations with and without memory");
+        for dt in [0.0025, 0.02, 0.04] {
+            let shorter = |world: &mut World| world.dt = dt;
+            let unscaled = |world: &mut World| (world.dt, world.memory.dt) = (dt, dt);
+            of_other_durations[0] += iterations_after(&mut world, shorter);
+            of_other_durations[1] += iterations_after(&mut world, unscaled);
+        }
         for (key, place) in keys {
             let moved = norm(sub(world.pose(key).position, place));
             assert!(moved < 2e-3, "seed {seed}: block {key} moved {moved}");
         }
         let speed = world.velocities.iter().map(|v| norm(*v)).fold(0.0, f64::max);
-        assert!(speed < 1e-2, "seed {seed}: still at {speed} m/s");
+        assert!(speed < 1e-6, "seed {seed}: still at {speed} m/s");
     }
+    let [scaled, unscaled] = of_other_durations;
+    assert!(3 * scaled <= 2 * unscaled, "impulses of a step of another duration: {scaled} and {unscaled} iterations");
 }
 
 /// Iterations of a step after a change of the world, which is then put back.
 fn iterations_after(world: &mut World, change: impl Fn(&mut World)) -> u32 {
     let (state, memory, velocities) = (world.state.clone(), world.memory.clone(), world.velocities.clone());
+    let dt = world.dt;
     change(world);
     let iterations = world.step().iterations;
-    (world.state, world.memory, world.velocities) = (state, memory, velocities);
+    (world.state, world.memory, world.velocities, world.dt) = (state, memory, velocities, dt);
     iterations
 }
 
-/// Ten blocks, a little out of line: tall for passes over the contacts, and their rows share the load.
+/// Ten blocks, a little out of line: tall for passes over the contacts, and their rows share the load. Within three
+/// seconds they are quiet, by the solver alone, and stay so.
 #[test]
-fn a_tall_stack_comes_to_rest() {
-    for seed in 0..3 {
+fn a_tall_stack_goes_quiet() {
+    for seed in 0..4 {
         let mut jitter = Jitter(seed);
         let mut plan = Plan::rubbing(0.5);
         let side = 0.2;
@@ -61,15 +72,13 @@ fn a_tall_stack_comes_to_rest() {
         let mut world = plan.build();
         world.gravity = [0.0, 0.0, -9.81];
         let masses = world.masses();
-        let mut at_the_cap = 0;
-        for step in 0..100 {
+        for step in 0..500 {
             let report = world.step();
-            at_the_cap += u32::from(report.not_converged);
-            assert!(report.complementarity_residual < 1e-2, "seed {seed} step {step}: {report:?}");
+            assert!(report.complementarity_residual < 1e-3, "seed {seed} step {step}: {report:?}");
             assert!(report.parts == 1 && report.rounds <= 3, "seed {seed} step {step}: {report:?}");
+            assert!(!report.not_converged, "seed {seed} step {step}: {report:?}");
+            let energy = kinetic(&masses, &world.velocities) / 10.0;
+            assert!(step < 300 || energy < 1e-10, "seed {seed} step {step}: {energy:e} J/kg");
         }
-        assert!(at_the_cap <= 3, "seed {seed}: {at_the_cap} of 100 steps used up their iterations");
-        let energy = kinetic(&masses, &world.velocities) / 10.0;
-        assert!(energy < 1e-5, "seed {seed}: {energy:e} J/kg");
     }
 }

@@ -30,6 +30,29 @@ fn a_fast_vertex_does_not_pass_through_thin_cloth() {
     }
 }
 
+/// Sheets so thin that the first tolerance of a solve is coarser than they are: what it misses is solved again, tighter,
+/// and no step is divided.
+#[test]
+fn a_row_that_the_solver_missed_is_solved_again_more_tightly() {
+    for seed in 1..9 {
+        let mut plan = Plan::rubbing(0.3);
+        let mut jitter = Jitter(seed);
+        for layer in 0..2 {
+            let (cloth, z) = (sheet(4, 0.3), 0.005 + 0.005 * f64::from(layer));
+            let start = moved(&cloth, [2.0 * z - 0.01, 0.0, z], &mut jitter, 1e-3);
+            plan.cloth(&cloth, start, 0.1, &[], [0.0, 0.0, -3.0]);
+            plan.last().half_thickness = Some(1e-7);
+        }
+        plan.half_space([0.0, 0.0, 1.0], 0.0);
+        plan.last().half_thickness = Some(1e-7);
+        let mut world = plan.build();
+        for step in 0..2 {
+            let report = world.step();
+            assert!(report.parts == 1 && report.rigid_zones == 0, "seed {seed} step {step}: {report:?}");
+        }
+    }
+}
+
 #[test]
 fn a_host_that_pushes_through_a_sheet_is_caught_by_the_sweep() {
     let mut plan = Plan::default();

@@ -141,6 +141,47 @@ fn conflicting_rows_are_solved_and_nothing_grows() {
     }
 }
 
+/// Relaxation stagnates on stiff elements that share rows; the augmented Lagrangian takes over.
+#[test]
+fn what_relaxation_does_not_solve_is_handed_over() {
+    let made = tetrahedra(200, &mut Random::new(3));
+    let settings = Settings { iterations_max: 5_000, ..Settings::default() };
+    let (_, _, report) = made.solve(&settings);
+    assert!(report.converged && report.hand_overs > 0, "{report:?}");
+    let alone = Settings { solver: SolverChoice::AcceleratedRelaxation, ..settings };
+    let (_, _, report) = made.solve(&alone);
+    assert!(!report.converged, "otherwise relaxation would do: {report:?}");
+}
+
+/// Masses beyond the range of single precision: iterations that overflow go on in double precision.
+#[test]
+fn what_overflows_in_single_precision_is_solved_in_double() {
+    for (stiffness, light, heavy) in [(1e25, 1e-20, 1.0), (1.0, 1e-25, 1e15), (1e3, 1e-30, 1e20)] {
+        let mut made = Made::new();
+        let mut random = Random::new(5);
+        for i in 0..40 {
+            let mass = if i % 3 == 0 { light } else { [1.0, heavy][usize::from(i % 7 == 0)] };
+            made.block(isotropic(mass), random.vector());
+        }
+        for i in 0..39u32 {
+            for axis in 0..3 {
+                let mut e = [0.0; 3];
+                e[axis] = 1.0;
+                let k = if i % 5 == 0 { stiffness } else { 1e-3 * light };
+                made.element(&[(i, e), (i + 1, [-e[0], -e[1], -e[2]])], k);
+            }
+        }
+        made.finish();
+        for i in 0..30u32 {
+            made.contact(&[(i, 1.0), ((7 * i + 11) % 40, -1.0)], &[], random.vector(), (-0.1, 0.4));
+        }
+        for solver in [SolverChoice::Automatic, SolverChoice::AcceleratedRelaxation] {
+            let (_, _, report) = made.solve(&Settings { solver, ..Settings::default() });
+            assert!(report.converged, "{solver:?} {stiffness} {light} {heavy}: {report:?}");
+        }
+    }
+}
+
 /// Opposed rows that no velocity satisfies: the solve ends, finite, and says so.
 #[test]
 fn infeasible_rows_end_at_the_cap_with_finite_numbers() {
@@ -257,13 +298,13 @@ fn odd_inputs_have_answers() {
 /// A heavy body that presses a light sheet on the ground: contacts need passes in proportion to the ratio of masses.
 #[test]
 fn a_heavy_body_on_a_light_sheet_is_solved_to_the_contact_tolerance() {
-    let n = 30u32;
+    let (n, mass) = (30u32, 1000.0);
     let mut made = Made::new();
     for _ in 0..n * n {
         made.block(isotropic(1e-3), [0.0, 0.0, -0.1]);
     }
-    let linear = made.block(isotropic(1.0), [0.3, 0.0, -3.0]);
-    let angular = made.block(isotropic(0.02), [0.0, 0.5, 0.2]);
+    let linear = made.block(isotropic(mass), [0.3, 0.0, -3.0]);
+    let angular = made.block(isotropic(0.02 * mass), [0.0, 0.5, 0.2]);
     for y in 0..n {
         for x in 0..n - 1 {
             for (a, b) in [(y * n + x, y * n + x + 1), (x * n + y, (x + 1) * n + y)] {
@@ -278,8 +319,8 @@ fn a_heavy_body_on_a_light_sheet_is_solved_to_the_contact_tolerance() {
     made.finish();
     for y in 0..n {
         for x in 0..n {
-            made.contact(&[(y * n + x, 1.0)], &[], [0.0, 0.0, 1.0], (0.0, 0.4));
             if x.abs_diff(n / 2) < 3 && y.abs_diff(n / 2) < 3 {
+                made.contact(&[(y * n + x, 1.0)], &[], [0.0, 0.0, 1.0], (0.0, 0.4));
                 let lever = [0.05 * (f64::from(x) - 15.0), 0.05 * (f64::from(y) - 15.0), -0.1];
                 let entries = [(linear, 1.0), (y * n + x, -1.0)];
                 made.contact(&entries, &[(angular, lever)], [0.0, 0.0, 1.0], (0.0, 0.4));
@@ -287,9 +328,51 @@ fn a_heavy_body_on_a_light_sheet_is_solved_to_the_contact_tolerance() {
         }
     }
     let (_, reference, _) = made.solve(&tight(SolverChoice::AcceleratedRelaxation));
-    let settings = Settings { iterations_max: 400, ..Settings::default() };
+    // With twelve passes an iteration it takes 3,500.
+    let solver = SolverChoice::AcceleratedRelaxation;
+    let settings = Settings { solver, iterations_max: 1000, ..Settings::default() };
     let (error, report) = close(&made, &settings, &reference);
-    assert!(report.converged && report.hand_overs == 0 && error < settings.velocity_tolerance, "{error:e} {report:?}");
+    assert!(report.converged && error < settings.velocity_tolerance, "{error:e} {report:?}");
+}
+
+/// A heavy body that wedges itself into light cloth with much friction: normal loads and friction limits follow each other
+/// in circles. Limits that follow by half lead to the solution.
+#[test]
+fn friction_that_circles_is_damped() {
+    let n = 16u32;
+    for (seed, tilt) in [(1, 1.0), (2, 1.0), (1, 2.0), (2, 2.0)] {
+        let mut random = Random::new(seed);
+        let mut made = Made::new();
+        for _ in 0..n * n {
+            made.block(isotropic(1e-4), [0.0; 3]);
+        }
+        let linear = made.block(isotropic(0.1), [0.5, 0.2, -6.0]);
+        let angular = made.block(isotropic(1e-3), [0.0, 0.5, 0.2]);
+        for y in 0..n {
+            for x in 0..n - 1 {
+                for (a, b, axis) in [(y * n + x, y * n + x + 1, 0), (x * n + y, (x + 1) * n + y, 1)] {
+                    for (direction, k) in [(axis, 1e-3), (0, 2e-5), (1, 2e-5), (2, 2e-5)] {
+                        let mut e = [0.0; 3];
+                        e[direction] = 1.0;
+                        made.element(&[(a, e), (b, [-e[0], -e[1], -e[2]])], k);
+                    }
+                }
+            }
+        }
+        made.finish();
+        for y in n / 2 - 2..=n / 2 + 2 {
+            for x in n / 2 - 2..=n / 2 + 2 {
+                let [rx, ry] = [x, y].map(|i| f64::from(i) - f64::from(n) / 2.0);
+                let lean = random.vector().map(|c| 0.3 * tilt * c);
+                let normal = [-(0.5 * tilt * rx + lean[0]), -(0.5 * tilt * ry + lean[1]), 1.0 + lean[2]];
+                let (entries, lever) = ([(linear, 1.0), (y * n + x, -1.0)], [0.02 * rx, 0.02 * ry, -0.1]);
+                made.contact(&entries, &[(angular, lever)], normal, (-2.0 * random.unit(), 1.0));
+            }
+        }
+        let solver = SolverChoice::AugmentedLagrangian;
+        let (_, _, report) = made.solve(&Settings { solver, iterations_max: 1500, ..Settings::default() });
+        assert!(report.converged, "seed {seed} tilt {tilt}: {report:?}");
+    }
 }
 
 /// Velocities of lumped masses follow from the impulses, and where a solve is cut off those can be anything: what is worse
