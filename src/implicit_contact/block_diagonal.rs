@@ -18,7 +18,7 @@ pub(super) fn holds(task: &Task, at: &mut Iterate, work: &mut Work) -> bool {
 }
 
 /// `dv = D^-1 C^T p`
-fn respond(task: &Task, p: &[Vec3], dv: &mut Vec<Vec3>, impulses: &mut Vec<Vec3>) {
+fn respond(task: &Task, p: &[Vec3], dv: &mut [Vec3], impulses: &mut Vec<Vec3>) {
     let (packed, inverse, par) = (task.packed, task.problem.inverse_diagonal, task.par);
     packed.impulses(p, impulses, par);
     let f = &*impulses;
