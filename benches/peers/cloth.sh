@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # cloth.sh OUT [STEPS] [SCENE...]: this library and other systems on the same cloths (drape, crumple, falling_cloth), one
-# after the other, STEPS steps (100) each or SECONDS_EACH (400) seconds; ends with a table. PEERS narrows the list.
+# after the other, STEPS steps (100) each or SECONDS_EACH (400) processor seconds; ends with a table. PEERS narrows the list.
 set -euo pipefail
 out=${1:?usage: benches/peers/cloth.sh OUT [STEPS] [SCENE...]}
 steps=${2:-100}

@@ -9,12 +9,35 @@ use crate::math::{Vec3, add_scaled, dot, mat_vec, sub};
 /// Passes between two residual checks.
 const CHECK_EVERY: u32 = 8;
 
-/// Takes the velocities that follow from the impulses; whether the contact residuals are within the tolerance then.
-pub(super) fn holds(task: &Task, at: &mut Iterate, work: &mut Work) -> bool {
-    let mut impulses = Vec::new();
-    respond(task, &at.p, &mut at.dv, &mut impulses);
-    work.contacts += 2 * at.p.len() as u64;
-    contact_residuals(task, &at.dv, &at.p).contact() <= task.settings.contact_tolerance
+/// The best iterate of several solvers in turn, by the contact residual of the velocities that follow from its impulses.
+pub(super) struct Best {
+    residual: f64,
+    at: Iterate,
+}
+
+impl Best {
+    /// `at` is the best so far.
+    pub fn new(task: &Task, at: &mut Iterate, work: &mut Work) -> Best {
+        let mut best = Best { residual: f64::INFINITY, at: at.clone() };
+        best.take(task, at, work);
+        best
+    }
+
+    /// Gives `at` the velocities that follow from its impulses, and puts the better of it and the best into both; whether
+    /// the contacts hold.
+    pub fn take(&mut self, task: &Task, at: &mut Iterate, work: &mut Work) -> bool {
+        let mut impulses = Vec::new();
+        respond(task, &at.p, &mut at.dv, &mut impulses);
+        work.contacts += 2 * at.p.len() as u64;
+        let residual = contact_residuals(task, &at.dv, &at.p).contact();
+        if residual < self.residual {
+            self.residual = residual;
+            self.at.clone_from(at);
+        } else {
+            at.clone_from(&self.at);
+        }
+        self.residual <= task.settings.contact_tolerance
+    }
 }
 
 /// `dv = D^-1 C^T p`

@@ -1,6 +1,7 @@
 //! The frictional contact problem [Otaduy09, Eq. 7] over one metric, and the one signature of its solvers.
 
 use super::accelerated_relaxation::{Control, Passes};
+use super::block_diagonal::Best;
 use super::direct_newton::DirectNewton;
 use super::friction::project;
 use super::iterative_anticipation::{self, Inner};
@@ -209,12 +210,13 @@ fn automatic_uncoupled(
     let max = task.settings.iterations_max;
     let mut iterations = 0;
     let small = |direct: &DirectNewton| direct.work() <= FACTORED_FIRST * task.packed.contacts.len();
+    let mut best = Best::new(task, at, work);
     if let Some(direct) = DirectNewton::new(task.problem).filter(small) {
         let left = (2 * UNCOUPLED_TURN).min(max / 2);
         let run = augmented_lagrangian::run(task, Some(direct), at, left, u32::MAX, buffers, work);
         iterations += run.iterations;
         // Velocities follow from the impulses here, and with those the contacts must hold.
-        if (run.ending == Ending::Converged && block_diagonal::holds(task, at, work)) || iterations >= max {
+        if (best.take(task, at, work) && run.ending == Ending::Converged) || iterations >= max {
             return run;
         }
         report.hand_overs += 1;
@@ -223,17 +225,22 @@ fn automatic_uncoupled(
     loop {
         let run = block_diagonal::solve(task, at, turn.min(max - iterations), work);
         iterations += run.iterations;
-        if run.ending == Ending::Converged || iterations >= max {
+        if run.ending == Ending::Converged {
+            return Run { iterations, ..run };
+        }
+        best.take(task, at, work);
+        if iterations >= max {
             return Run { iterations, ..run };
         }
         report.hand_overs += 1;
         let (direct, left) = (DirectNewton::new(task.problem), (2 * turn).min(max - iterations));
         let run = augmented_lagrangian::run(task, direct, at, left, u32::MAX, buffers, work);
         iterations += run.iterations;
+        // Converged or not: with the velocities that follow from the impulses the passes have the last word.
+        best.take(task, at, work);
         if iterations >= max {
             return Run { iterations, ending: Ending::Exhausted, error: None };
         }
-        // Converged or not: velocities follow from the impulses here, and with those the passes have the last word.
         report.hand_overs += 1;
         turn = turn.saturating_mul(2);
     }
