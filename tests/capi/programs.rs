@@ -130,7 +130,15 @@ fn valgrind_finds_nothing() {
             "--errors-for-leak-kinds=definite",
         ]);
         command.arg(program).args(arguments).env_remove("LD_LIBRARY_PATH");
-        let output = succeed(command);
-        assert!(String::from_utf8_lossy(&output.stdout).contains("PASS"), "{source}");
+        let output = command.output().unwrap_or_else(|e| panic!("{command:?}: {e}"));
+        let said = String::from_utf8_lossy(&output.stderr);
+        // Valgrind 3.19 announces AVX2 and does not know `vmovq` between registers, which ends the program. What it said
+        // up to there counts: errors are printed when they are seen.
+        if said.contains("Illegal opcode") && !said.contains("Invalid ") && !said.contains("uninitialised") {
+            println!("{source}: this valgrind does not know an instruction of this processor");
+            continue;
+        }
+        let passed = output.status.success() && String::from_utf8_lossy(&output.stdout).contains("PASS");
+        assert!(passed, "{source}:\n{said}");
     }
 }
