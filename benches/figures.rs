@@ -170,7 +170,7 @@ fn measured(host: &mut Host, steps: usize) -> String {
         share(within as f64),
         share(touching.iter().map(|r| f64::from(r.rounds)).sum()),
         count(&|r| r.parts > 1),
-        count(&|r| r.rigid_zones + r.held_vertices > 0),
+        count(&|r| r.zones() + r.held_vertices > 0),
         count(&|r| r.not_converged),
         count(&|r| r.intersections.unwrap_or(0) > 0),
         quantile(0.5),

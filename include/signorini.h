@@ -46,7 +46,7 @@
 #define SGN_NOTE_SUBDIVIDED 2
 
 /**
- * Note: rigid zones or held vertices were needed.
+ * Note: zones were projected or moved as rigid bodies, or vertices held.
  */
 #define SGN_NOTE_FAIL_SAFE_USED 3
 
@@ -651,6 +651,37 @@
 #define SGN_POLICY_PASS 1
 
 /**
+ * The smallest change of velocities after which no collision of the zone is left; impulses push and never pull. The
+ * default.
+ */
+#define SGN_FAIL_SAFE_UNILATERAL_PROJECTION 0
+
+/**
+ * The smallest change after which nothing in the zone approaches or separates; impulses may pull.
+ */
+#define SGN_FAIL_SAFE_INELASTIC_PROJECTION 1
+
+/**
+ * The zone moves as one rigid body.
+ */
+#define SGN_FAIL_SAFE_RIGID_ZONE 2
+
+/**
+ * Each contact within its own limit. The default.
+ */
+#define SGN_ZONE_FRICTION_PER_CONTACT 0
+
+/**
+ * One limit for all sliding of the zone.
+ */
+#define SGN_ZONE_FRICTION_PER_ZONE 1
+
+/**
+ * None.
+ */
+#define SGN_ZONE_FRICTION_NONE 2
+
+/**
  * Unconstrained dynamics of bodies that the library drives.
  */
 #define SGN_PHASE_DYNAMICS 0
@@ -666,7 +697,7 @@
 #define SGN_PHASE_ROUND 2
 
 /**
- * Rigid zones and held vertices.
+ * Zones and held vertices.
  */
 #define SGN_PHASE_FAIL_SAFE 3
 
@@ -686,7 +717,7 @@
 #define SGN_STEP_SUBDIVIDED 2
 
 /**
- * Bit of `SgnStepReport.notes`: rigid zones or held vertices were needed.
+ * Bit of `SgnStepReport.notes`: zones were projected or moved as rigid bodies, or vertices held.
  */
 #define SGN_STEP_FAIL_SAFE_USED 4
 
@@ -1639,6 +1670,17 @@ typedef int32_t SgnPhase;
 typedef int32_t (*SgnProgressCallback)(void *user, SgnPhase phase, double fraction);
 
 /**
+ * What answers a zone of collisions that the method's own iterations left, before it moves as a rigid body and before
+ * it is held.
+ */
+typedef int32_t SgnFailSafe;
+
+/**
+ * Friction within a projected zone.
+ */
+typedef int32_t SgnZoneFriction;
+
+/**
  * A step to be made. Fill with `sgn_step_desc_init`, then set `dt`. All tolerances are relative, all caps are counters.
  */
 typedef struct SgnStepDesc {
@@ -1710,6 +1752,14 @@ typedef struct SgnStepDesc {
    * Handed to the callback.
    */
   void *progress_user;
+  /**
+   * An `SGN_FAIL_SAFE_` constant.
+   */
+  SgnFailSafe fail_safe;
+  /**
+   * An `SGN_ZONE_FRICTION_` constant.
+   */
+  SgnZoneFriction zone_friction;
 } SgnStepDesc;
 
 /**
@@ -1828,6 +1878,10 @@ typedef struct SgnStepReport {
    * Microseconds of the metric, and of assembly and unconstrained solve of the bodies that the library drives.
    */
   double dynamics_microseconds;
+  /**
+   * Zones whose velocities were projected.
+   */
+  uint64_t projected_zones;
 } SgnStepReport;
 
 /**

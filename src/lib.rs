@@ -18,7 +18,7 @@
 //! | [`dynamics`] | assembly and the unconstrained step of the bodies that the library drives |
 //! | [`contact_search`] | contacts with body ids and persistent keys |
 //! | [`constraint`] | contacts as rows over the degrees of freedom |
-//! | [`fail_safe`] | rigid zones and hold |
+//! | [`fail_safe`] | zones (projections, rigid zones) and hold |
 //! | [`implicit_contact`] | constraint manifold refinement around iterative constraint anticipation |
 //! | [`world`] | bodies by id, the step, queries |
 //! | [`capi`] | the C ABI |

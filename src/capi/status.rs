@@ -12,7 +12,7 @@ pub const SGN_OK: i32 = 0;
 pub const SGN_NOTE_NOT_CONVERGED: i32 = 1;
 /// Note: the step was divided.
 pub const SGN_NOTE_SUBDIVIDED: i32 = 2;
-/// Note: rigid zones or held vertices were needed.
+/// Note: zones were projected or moved as rigid bodies, or vertices held.
 pub const SGN_NOTE_FAIL_SAFE_USED: i32 = 3;
 /// Note: pairs of a tangled component passed through each other.
 pub const SGN_NOTE_TANGLED_PAIRS: i32 = 4;

@@ -8,7 +8,9 @@ use super::status::{
 };
 use super::structs::{self, Growing};
 use super::world::SgnWorld;
-use crate::model::{FrictionCone, Phase, Settings, SolverChoice, StartPolicy, StepReport, Watch};
+use crate::model::{
+    FailSafe, FrictionCone, Phase, Settings, SolverChoice, StartPolicy, StepReport, Watch, ZoneFriction,
+};
 use std::ffi::c_void;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -50,6 +52,26 @@ pub const SGN_POLICY_REFUSE: i32 = 0;
 /// Pairs that touch the connected tangled component pass until it has separated; everything else keeps the promise.
 pub const SGN_POLICY_PASS: i32 = 1;
 
+/// What answers a zone of collisions that the method's own iterations left, before it moves as a rigid body and before
+/// it is held.
+pub type SgnFailSafe = i32;
+/// The smallest change of velocities after which no collision of the zone is left; impulses push and never pull. The
+/// default.
+pub const SGN_FAIL_SAFE_UNILATERAL_PROJECTION: i32 = 0;
+/// The smallest change after which nothing in the zone approaches or separates; impulses may pull.
+pub const SGN_FAIL_SAFE_INELASTIC_PROJECTION: i32 = 1;
+/// The zone moves as one rigid body.
+pub const SGN_FAIL_SAFE_RIGID_ZONE: i32 = 2;
+
+/// Friction within a projected zone.
+pub type SgnZoneFriction = i32;
+/// Each contact within its own limit. The default.
+pub const SGN_ZONE_FRICTION_PER_CONTACT: i32 = 0;
+/// One limit for all sliding of the zone.
+pub const SGN_ZONE_FRICTION_PER_ZONE: i32 = 1;
+/// None.
+pub const SGN_ZONE_FRICTION_NONE: i32 = 2;
+
 /// Phase of a step.
 pub type SgnPhase = i32;
 /// Unconstrained dynamics of bodies that the library drives.
@@ -58,7 +80,7 @@ pub const SGN_PHASE_DYNAMICS: i32 = 0;
 pub const SGN_PHASE_START: i32 = 1;
 /// A round: contacts, constrained dynamics, continuous detection.
 pub const SGN_PHASE_ROUND: i32 = 2;
-/// Rigid zones and held vertices.
+/// Zones and held vertices.
 pub const SGN_PHASE_FAIL_SAFE: i32 = 3;
 
 /// Told before each phase of a step, on the thread that steps, with the fraction of the step that is done. Returns 0 to
@@ -106,12 +128,16 @@ pub struct SgnStepDesc {
     pub progress_callback: SgnProgressCallback,
     /// Handed to the callback.
     pub progress_user: *mut c_void,
+    /// An `SGN_FAIL_SAFE_` constant.
+    pub fail_safe: SgnFailSafe,
+    /// An `SGN_ZONE_FRICTION_` constant.
+    pub zone_friction: SgnZoneFriction,
 }
 
 // SAFETY: repr(C) without padding; numbers, a pointer and a nullable function.
 unsafe impl Growing for SgnStepDesc {
     const NAME: &'static str = "SgnStepDesc";
-    const FIRST_SIZE: usize = 104;
+    const FIRST_SIZE: usize = 112;
     fn defaults() -> Self {
         let s = Settings::default();
         SgnStepDesc {
@@ -132,7 +158,29 @@ unsafe impl Growing for SgnStepDesc {
             turn_max: s.turn_max,
             progress_callback: None,
             progress_user: std::ptr::null_mut(),
+            fail_safe: SGN_FAIL_SAFE_UNILATERAL_PROJECTION,
+            zone_friction: SGN_ZONE_FRICTION_PER_CONTACT,
         }
+    }
+}
+
+/// The fail-safe of an `SGN_FAIL_SAFE_` constant.
+pub(super) fn fail_safe(constant: SgnFailSafe) -> Result<FailSafe, Failure> {
+    match constant {
+        SGN_FAIL_SAFE_UNILATERAL_PROJECTION => Ok(FailSafe::UnilateralProjection),
+        SGN_FAIL_SAFE_INELASTIC_PROJECTION => Ok(FailSafe::InelasticProjection),
+        SGN_FAIL_SAFE_RIGID_ZONE => Ok(FailSafe::RigidZone),
+        other => Err(invalid("fail_safe", f64::from(other))),
+    }
+}
+
+/// The friction of an `SGN_ZONE_FRICTION_` constant.
+pub(super) fn zone_friction(constant: SgnZoneFriction) -> Result<ZoneFriction, Failure> {
+    match constant {
+        SGN_ZONE_FRICTION_PER_CONTACT => Ok(ZoneFriction::PerContact),
+        SGN_ZONE_FRICTION_PER_ZONE => Ok(ZoneFriction::PerZone),
+        SGN_ZONE_FRICTION_NONE => Ok(ZoneFriction::Frictionless),
+        other => Err(invalid("zone_friction", f64::from(other))),
     }
 }
 
@@ -198,6 +246,8 @@ impl SgnStepDesc {
             recovery_fraction: self.recovery_fraction,
             proximity_factor: self.proximity_factor,
             turn_max: self.turn_max,
+            fail_safe: fail_safe(self.fail_safe)?,
+            zone_friction: zone_friction(self.zone_friction)?,
             certify: self.flags & SGN_STEP_CERTIFY != 0,
             ..Settings::default()
         })
@@ -208,7 +258,7 @@ impl SgnStepDesc {
 pub const SGN_STEP_NOT_CONVERGED: u64 = 1;
 /// Bit of `SgnStepReport.notes`: the step was divided.
 pub const SGN_STEP_SUBDIVIDED: u64 = 2;
-/// Bit of `SgnStepReport.notes`: rigid zones or held vertices were needed.
+/// Bit of `SgnStepReport.notes`: zones were projected or moved as rigid bodies, or vertices held.
 pub const SGN_STEP_FAIL_SAFE_USED: u64 = 4;
 /// Bit of `SgnStepReport.notes`: pairs of a tangled component passed.
 pub const SGN_STEP_TANGLED_PAIRS: u64 = 8;
@@ -273,12 +323,14 @@ pub struct SgnStepReport {
     pub bytes: u64,
     /// Microseconds of the metric, and of assembly and unconstrained solve of the bodies that the library drives.
     pub dynamics_microseconds: f64,
+    /// Zones whose velocities were projected.
+    pub projected_zones: u64,
 }
 
 // SAFETY: repr(C) without padding; numbers.
 unsafe impl Growing for SgnStepReport {
     const NAME: &'static str = "SgnStepReport";
-    const FIRST_SIZE: usize = 200;
+    const FIRST_SIZE: usize = 208;
     fn defaults() -> Self {
         // SAFETY: numbers only.
         unsafe { std::mem::zeroed() }
@@ -290,7 +342,7 @@ impl SgnStepReport {
         let notes = [
             (report.not_converged, SGN_STEP_NOT_CONVERGED),
             (report.parts > 1, SGN_STEP_SUBDIVIDED),
-            (report.rigid_zones > 0 || report.held_vertices > 0, SGN_STEP_FAIL_SAFE_USED),
+            (report.projected_zones + report.rigid_zones + report.held_vertices > 0, SGN_STEP_FAIL_SAFE_USED),
             (report.tangled_pairs > 0, SGN_STEP_TANGLED_PAIRS),
         ];
         SgnStepReport {
@@ -322,6 +374,7 @@ impl SgnStepReport {
             total_microseconds: report.times.total,
             bytes: report.bytes,
             dynamics_microseconds: report.times.dynamics,
+            projected_zones: u64::from(report.projected_zones),
         }
     }
 
@@ -446,13 +499,14 @@ impl ProgressOfHost<'_> {
 
 fn summary(report: &SgnStepReport) -> String {
     format!(
-        "sgn_world_step: {} contacts, {} with an impulse, {} rounds, {} iterations, {} parts, {} rigid zones, {} held \
-         vertices, {} tangled pairs, residuals {:.1e} {:.1e} {:.1e}, {:.0} us",
+        "sgn_world_step: {} contacts, {} with an impulse, {} rounds, {} iterations, {} parts, {} projected and \
+         {} rigid zones, {} held vertices, {} tangled pairs, residuals {:.1e} {:.1e} {:.1e}, {:.0} us",
         report.contacts,
         report.active_contacts,
         report.rounds,
         report.iterations,
         report.parts,
+        report.projected_zones,
         report.rigid_zones,
         report.held_vertices,
         report.tangled_pairs,

@@ -1,138 +1,48 @@
-//! Rigid zones: what still collides moves as one rigid body, with its own momentum [Harmon10, Algorithm 2].
+//! A rigid zone: what collides moves as one rigid body, with its own momentum [Harmon10, Algorithm 2].
 
 use super::nodes::Nodes;
-use super::sweep::Sweep;
 use crate::constraint::Metric;
-use crate::contact_search::{CandidateSearch, Hit};
 use crate::kinematics::{MassElement, RigidMotion, displacement_fit, momentum_fit};
-use crate::math::{Vec3, add, scale, sub};
+use crate::math::{Vec3, add, cross, mat_vec, norm, scale, sub};
 use crate::model::{Kind, Segment, State};
-
-/// Rounds of growing zones at most.
-const ROUNDS: usize = 10;
 
 /// Turn of a zone within a segment at most `[rad]`: chords of a rigid turn shrink distances by `cos(turn/2)`, which
 /// must stay well above the half that continuous detection keeps.
 const TURN: f64 = 1.0;
 
-/// What rigid zones led to.
-pub struct ZoneOutcome {
-    /// Velocity per block, zones applied.
-    pub velocities: Vec<Vec3>,
-    /// End state.
-    pub end: State,
-    /// Hits left; empty when the zones resolved the segment.
-    pub hits: Vec<Hit>,
-    /// Number of zones.
-    pub zones: u32,
+/// What moving a zone rigidly came to.
+pub(super) struct RigidZone {
+    /// The velocity by which scripted members miss the motion `[m/s]`.
+    pub misfit: f64,
+    /// Angular momentum that the movable nodes gained, about the centre of the motion `[N m s]`.
+    pub angular_momentum_change: Vec3,
 }
 
-/// Lets the nodes of hit pairs move as rigid zones until nothing is hit or zones no longer grow.
+/// Moves the movable nodes of a zone as one rigid body.
 ///
-/// Zones that share a node merge. A zone with scripted members follows the motion that fits them best; the others keep
-/// their linear and angular momentum. Cost: at most 10 rounds of continuous detection.
-pub fn rigid_zones(
-    sweep: &Sweep,
-    metric: &Metric,
-    tentative: &[Vec3],
-    hits: &[Hit],
-    candidates: &mut CandidateSearch,
-) -> ZoneOutcome {
-    let nodes = Nodes::new(sweep.segment.model, metric);
-    let mut zones = Zones::new(nodes.len());
-    let mut outcome =
-        ZoneOutcome { velocities: tentative.to_vec(), end: State::default(), hits: hits.to_vec(), zones: 0 };
-    for _ in 0..ROUNDS {
-        let grown = outcome.hits.iter().filter(|hit| zones.join(&nodes.of_pair(&hit.pair))).count();
-        if grown == 0 {
-            break;
-        }
-        outcome.velocities = tentative.to_vec();
-        let members = zones.members();
-        outcome.zones = members.len() as u32;
-        for zone in &members {
-            move_zone(&sweep.segment, metric, &nodes, zone, tentative, &mut outcome.velocities);
-        }
-        (outcome.end, outcome.hits) = sweep.test(&outcome.velocities, 1.0, candidates);
-        if outcome.hits.is_empty() {
-            break;
-        }
-    }
-    outcome
-}
-
-/// Disjoint sets of nodes.
-struct Zones {
-    parent: Vec<usize>,
-    in_zone: Vec<bool>,
-}
-
-impl Zones {
-    fn new(count: usize) -> Zones {
-        Zones { parent: (0..count).collect(), in_zone: vec![false; count] }
-    }
-
-    fn root(&mut self, mut node: usize) -> usize {
-        while self.parent[node] != node {
-            self.parent[node] = self.parent[self.parent[node]];
-            node = self.parent[node];
-        }
-        node
-    }
-
-    /// Joins the nodes; whether that changed anything.
-    fn join(&mut self, nodes: &[usize]) -> bool {
-        let mut changed = false;
-        for node in nodes {
-            changed |= !std::mem::replace(&mut self.in_zone[*node], true);
-            let (a, b) = (self.root(nodes[0]), self.root(*node));
-            if a != b {
-                self.parent[a.max(b)] = a.min(b);
-                changed = true;
-            }
-        }
-        changed
-    }
-
-    /// Members of every zone, in node order.
-    fn members(&mut self) -> Vec<Vec<usize>> {
-        let mut slot = vec![usize::MAX; self.parent.len()];
-        let mut members: Vec<Vec<usize>> = Vec::new();
-        for node in 0..self.parent.len() {
-            if !self.in_zone[node] {
-                continue;
-            }
-            let root = self.root(node);
-            if slot[root] == usize::MAX {
-                slot[root] = members.len();
-                members.push(Vec::new());
-            }
-            members[slot[root]].push(node);
-        }
-        members
-    }
-}
-
-fn move_zone(
+/// Without scripted members the zone keeps its linear and angular momentum. With some, infinite mass decides: the zone
+/// follows the motion that fits theirs best. Where these motions contradict each other, rigid zones break down
+/// [Harmon10, §3.1]: no rigid motion follows them all, and what is missed is returned.
+pub(super) fn move_zone(
     segment: &Segment,
     metric: &Metric,
     nodes: &Nodes,
-    zone: &[usize],
+    movable: &[usize],
+    scripted: &[usize],
     tentative: &[Vec3],
     velocities: &mut [Vec3],
-) {
-    let scripted: Vec<usize> = zone.iter().copied().filter(|n| nodes.is_scripted(*n)).collect();
-    let motion = if scripted.is_empty() {
-        free_motion(segment, metric, nodes, zone, tentative)
-    } else {
-        scripted_motion(segment, nodes, &scripted, tentative)
+) -> RigidZone {
+    let script = (!scripted.is_empty()).then(|| Script::new(segment, nodes, scripted, tentative));
+    let motion = match &script {
+        Some(script) => script.motion,
+        None => free_motion(segment, metric, nodes, movable, tentative),
     };
-    let Some(mut motion) = motion else { return };
+    let Some(mut motion) = motion else { return RigidZone { misfit: 0.0, angular_momentum_change: [0.0; 3] } };
     let turn = crate::kinematics::turn(motion.angular, segment.dt);
     if turn > TURN {
         motion.angular = scale(TURN / turn, motion.angular);
     }
-    for node in zone.iter().filter(|n| !nodes.is_scripted(**n)) {
+    for node in movable {
         let first = nodes.first_block(*node);
         let start = match nodes.body(*node) {
             Some(body) => {
@@ -143,6 +53,38 @@ fn move_zone(
         };
         velocities[first] = scale(1.0 / segment.dt, sub(motion.moved(start, segment.dt), start));
     }
+    RigidZone {
+        misfit: script.map_or(0.0, |script| script.missed(&motion, segment.dt)),
+        angular_momentum_change: angular_momentum_change(segment, metric, nodes, movable, tentative, &motion),
+    }
+}
+
+/// What a motion has, at its start, less what the nodes had.
+fn angular_momentum_change(
+    segment: &Segment,
+    metric: &Metric,
+    nodes: &Nodes,
+    movable: &[usize],
+    tentative: &[Vec3],
+    motion: &RigidMotion,
+) -> Vec3 {
+    let mut change = [0.0; 3];
+    for node in movable {
+        let first = nodes.first_block(*node);
+        let position = match nodes.body(*node) {
+            Some(body) => {
+                let turn = sub(motion.angular, tentative[first + 1]);
+                change = add(change, mat_vec(&metric.lumped[first + 1], turn));
+                segment.start.poses[body].position
+            }
+            None => segment.start.positions[*node],
+        };
+        let arm = sub(position, motion.centre);
+        let moved = add(motion.linear, cross(motion.angular, arm));
+        let gained = mat_vec(&metric.lumped[first], sub(moved, tentative[first]));
+        change = add(change, cross(arm, gained));
+    }
+    change
 }
 
 fn free_motion(
@@ -163,34 +105,55 @@ fn free_motion(
     momentum_fit(&zone.iter().map(element).collect::<Vec<_>>())
 }
 
-/// The motion of what is scripted in a zone: a single posed body's own, else the best fit to the displacements.
-fn scripted_motion(segment: &Segment, nodes: &Nodes, scripted: &[usize], tentative: &[Vec3]) -> Option<RigidMotion> {
-    let mut end = State::default();
-    segment.end_state(tentative, 1.0, true, &mut end);
-    if let [node] = scripted
-        && let Some(body) = nodes.body(*node)
-        && !matches!(segment.model.bodies[body].description.kind, Kind::HalfSpace(_))
-    {
-        let start = segment.start.poses[body];
-        let (linear, angular) = start.velocity_to(&end.poses[body], segment.dt);
-        return Some(RigidMotion { centre: start.position, linear, angular });
-    }
-    let mut points: Vec<(Vec3, Vec3)> = Vec::new();
-    for node in scripted {
-        match nodes.body(*node) {
-            None => points.push((segment.start.positions[*node], end.positions[*node])),
-            Some(body) => match segment.model.bodies[body].description.kind {
-                Kind::HalfSpace(_) => {
-                    let (a, b) = (&segment.start.half_spaces[body], &end.half_spaces[body]);
-                    let moved = sub(scale(b.offset, b.normal), scale(a.offset, a.normal));
-                    let at = scale(a.offset, a.normal);
-                    points.push((at, add(at, moved)));
-                }
-                _ => points.extend(
-                    segment.model.bodies[body].vertices.clone().map(|v| (segment.start.positions[v], end.positions[v])),
-                ),
-            },
+/// The scripted members of a zone.
+struct Script {
+    /// Start and end of points of them.
+    points: Vec<(Vec3, Vec3)>,
+    /// The motion of the zone: a single posed body's own, else the best fit to the displacements.
+    motion: Option<RigidMotion>,
+}
+
+impl Script {
+    fn new(segment: &Segment, nodes: &Nodes, scripted: &[usize], tentative: &[Vec3]) -> Script {
+        let mut end = State::default();
+        segment.end_state(tentative, 1.0, true, &mut end);
+        let mut points: Vec<(Vec3, Vec3)> = Vec::new();
+        for node in scripted {
+            match nodes.body(*node) {
+                None => points.push((segment.start.positions[*node], end.positions[*node])),
+                Some(body) => match segment.model.bodies[body].description.kind {
+                    Kind::HalfSpace(_) => {
+                        let (a, b) = (&segment.start.half_spaces[body], &end.half_spaces[body]);
+                        let moved = sub(scale(b.offset, b.normal), scale(a.offset, a.normal));
+                        let at = scale(a.offset, a.normal);
+                        points.push((at, add(at, moved)));
+                    }
+                    _ => {
+                        let vertices = segment.model.bodies[body].vertices.clone();
+                        points.extend(vertices.map(|v| (segment.start.positions[v], end.positions[v])));
+                    }
+                },
+            }
         }
+        let posed = match scripted {
+            [node] => nodes
+                .body(*node)
+                .filter(|body| !matches!(segment.model.bodies[*body].description.kind, Kind::HalfSpace(_))),
+            _ => None,
+        };
+        let motion = match posed {
+            Some(body) => {
+                let start = segment.start.poses[body];
+                let (linear, angular) = start.velocity_to(&end.poses[body], segment.dt);
+                Some(RigidMotion { centre: start.position, linear, angular })
+            }
+            None => displacement_fit(&points, segment.dt),
+        };
+        Script { points, motion }
     }
-    displacement_fit(&points, segment.dt)
+
+    /// The largest velocity by which a point misses a motion.
+    fn missed(&self, motion: &RigidMotion, dt: f64) -> f64 {
+        self.points.iter().map(|(a, b)| norm(sub(motion.moved(*a, dt), *b)) / dt).fold(0.0, f64::max)
+    }
 }

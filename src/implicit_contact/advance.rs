@@ -136,7 +136,7 @@ fn run_parts(
             warm.keep_velocities(model, &account.end_velocities);
             continue;
         }
-        // (7) Fail-safes: divide, rigid zones, hold, pinched.
+        // (7) Fail-safes: divide, zones, hold, pinched.
         if part.depth < settings.halvings_max && account.report.parts + (parts.len() as u32) < PARTS_MAX {
             let [first, second] = part.halves();
             parts.extend([second, first]);
@@ -147,8 +147,8 @@ fn run_parts(
         let outcome = fall_back(around, &segment, passing, refined, scratch);
         account.report.times.fail_safe += lap(&mut clock);
         match outcome {
-            FallBack::Resolved { refined, zones, held_vertices, momentum_taken } => {
-                account.add_fail_safe(zones, held_vertices, share, momentum_taken);
+            FallBack::Resolved { refined, projected, rigid, held_vertices, momentum_taken } => {
+                account.add_fail_safe([projected, rigid, held_vertices], share, momentum_taken);
                 account.add_part(model, around, *refined, share, segment.dt);
                 warm.keep_velocities(model, &account.end_velocities);
             }

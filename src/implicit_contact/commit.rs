@@ -68,10 +68,11 @@ impl StepAccount {
         self.last_dt = dt;
     }
 
-    /// Books what fail-safes did in a part that lasts `share` of the step.
-    pub fn add_fail_safe(&mut self, zones: u32, held_vertices: u32, share: f64, momentum_taken: Vec3) {
-        self.report.rigid_zones += zones;
-        self.report.held_vertices += held_vertices;
+    /// Books the zones projected, the rigid ones and the vertices held in a part that lasts `share` of the step.
+    pub fn add_fail_safe(&mut self, [projected, rigid, held]: [u32; 3], share: f64, momentum_taken: Vec3) {
+        self.report.projected_zones += projected;
+        self.report.rigid_zones += rigid;
+        self.report.held_vertices += held;
         self.report.momentum_taken = add_scaled(self.report.momentum_taken, share, momentum_taken);
     }
 

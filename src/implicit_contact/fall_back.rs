@@ -3,7 +3,7 @@
 use super::Scratch;
 use super::manifold_refinement::{Refined, Surroundings};
 use crate::contact_search::{Hit, Passing};
-use crate::fail_safe::{Nodes, Sweep, certified_share, hold, rigid_zones};
+use crate::fail_safe::{Nodes, Sweep, ZoneResponse, certified_share, hold, resolve_zones};
 use crate::math::{Vec3, add, mat_vec, sub};
 use crate::model::{Body, Kind, Model, Segment, State, Witness};
 
@@ -13,8 +13,10 @@ pub(super) enum FallBack {
     Resolved {
         /// The refined segment with velocities, impulses and end replaced.
         refined: Box<Refined>,
+        /// Zones whose velocities were projected.
+        projected: u32,
         /// Zones that moved as rigid bodies.
-        zones: u32,
+        rigid: u32,
         /// Vertices held, those of rigid bodies too.
         held_vertices: u32,
         /// Momentum that held nodes, and zones with scripted members, lost `[N s]`.
@@ -31,7 +33,7 @@ pub(super) enum FallBack {
     },
 }
 
-/// Rigid zones, then hold, then the last certified share.
+/// Zones, projected or rigid, then hold, then the last certified share.
 pub(super) fn fall_back(
     around: &Surroundings,
     segment: &Segment,
@@ -47,11 +49,13 @@ pub(super) fn fall_back(
         par: around.par,
     };
     let (metric, candidates) = (around.metric, &mut scratch.candidates);
-    let zones = rigid_zones(&sweep, metric, &refined.velocities, &refined.hits, candidates);
+    let response = ZoneResponse { fail_safe: around.settings.fail_safe, friction: around.settings.zone_friction };
+    let zones = resolve_zones(&sweep, metric, &refined.velocities, &refined.hits, candidates, &response);
+    let (projected, rigid) = (zones.projected, zones.rigid);
     if zones.hits.is_empty() {
         let momentum_taken = momentum_lost(segment.model, around, &refined.velocities, &zones.velocities);
-        let refined = replaced(around, refined, zones.velocities, zones.end);
-        return FallBack::Resolved { refined: Box::new(refined), zones: zones.zones, held_vertices: 0, momentum_taken };
+        let refined = Box::new(replaced(around, refined, zones.velocities, zones.end));
+        return FallBack::Resolved { refined, projected, rigid, held_vertices: 0, momentum_taken };
     }
     let holding = hold(&sweep, metric, &refined.velocities, &refined.hits, candidates);
     if holding.hits.is_empty() {
@@ -62,7 +66,13 @@ pub(super) fn fall_back(
             held_vertices += nodes.body(*node).map_or(1, |body| segment.model.bodies[body].vertices.len() as u32);
         }
         let refined = replaced(around, refined, holding.velocities, holding.end);
-        return FallBack::Resolved { refined: Box::new(refined), zones: 0, held_vertices, momentum_taken };
+        return FallBack::Resolved {
+            refined: Box::new(refined),
+            projected: 0,
+            rigid: 0,
+            held_vertices,
+            momentum_taken,
+        };
     }
     let (share, state) = certified_share(&sweep, &holding.velocities, &holding.hits, candidates);
     FallBack::Pinched { share, state: Box::new(state), hits: holding.hits }

@@ -1,7 +1,13 @@
 //! Rigid motion of vertices: placing them by a pose, interpolating poses, the lever of a chord, the best rigid fit.
 
 use super::Pose;
-use crate::math::{Mat3, Vec3, add, add_scaled, cross, inverse, mat_vec, norm, norm_squared, scale, sub};
+use crate::math::{
+    Mat3, Vec3, add, add_scaled, cross, mat_transpose_vec, mat_vec, norm, norm_squared, scale, sub,
+    symmetric_eigenvectors,
+};
+
+/// A principal moment of this share of the largest one is rounding.
+const NO_INERTIA: f64 = 1e-12;
 
 /// The vector with every component rounded to `f32`.
 #[inline]
@@ -93,8 +99,8 @@ pub struct MassElement {
 
 /// The rigid motion with the same linear and angular momentum as the elements [Bridson02, §7.4; Harmon10, Algorithm 2].
 ///
-/// Turns about axes without inertia (collinear points) are left out: the inertia is inverted with the degenerate
-/// axis made as heavy as the others. No elements or no mass: `None`.
+/// It does not turn about axes without inertia (collinear points): these hold no angular momentum. No elements or no mass:
+/// `None`.
 pub fn momentum_fit(elements: &[MassElement]) -> Option<RigidMotion> {
     let mass: f64 = elements.iter().map(|e| e.mass).sum();
     if mass <= 0.0 || !mass.is_finite() {
@@ -119,11 +125,10 @@ pub fn momentum_fit(elements: &[MassElement]) -> Option<RigidMotion> {
             }
         }
     }
-    let trace = inertia[0][0] + inertia[1][1] + inertia[2][2];
-    for (i, row) in inertia.iter_mut().enumerate() {
-        row[i] += 1e-9 * trace;
-    }
-    let angular = inverse(&inertia).map_or([0.0; 3], |inverse| mat_vec(&inverse, momentum));
+    let (moments, axes) = symmetric_eigenvectors(&inertia);
+    let along = mat_transpose_vec(&axes, momentum);
+    let rates = std::array::from_fn(|k| if moments[k] > NO_INERTIA * moments[0] { along[k] / moments[k] } else { 0.0 });
+    let angular = mat_vec(&axes, rates);
     Some(RigidMotion { centre, linear, angular })
 }
 

@@ -85,6 +85,8 @@ pub struct StepReport {
     pub iterations: u32,
     /// Parts that the step was divided into; 1 when it was not.
     pub parts: u32,
+    /// Zones whose velocities were projected.
+    pub projected_zones: u32,
     /// Zones that moved as rigid bodies.
     pub rigid_zones: u32,
     /// Vertices held.
@@ -113,6 +115,13 @@ pub struct StepReport {
     pub times: StageTimes,
     /// Bytes held by memory and scratch.
     pub bytes: u64,
+}
+
+impl StepReport {
+    /// Zones that were projected or moved as rigid bodies.
+    pub fn zones(&self) -> u32 {
+        self.projected_zones + self.rigid_zones
+    }
 }
 
 /// A description that cannot be built, naming what and where.

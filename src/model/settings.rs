@@ -39,6 +39,33 @@ pub enum StartPolicy {
     Pass,
 }
 
+/// What answers a zone of collisions that the method's own iterations left. One that does not help turns the zone into
+/// a rigid one, then into one that is held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FailSafe {
+    /// The smallest change of velocities, in the metric of the masses, after which no collision of the zone comes closer
+    /// than it may: impulses push and never pull.
+    #[default]
+    UnilateralProjection,
+    /// The smallest change after which no collision of the zone approaches or separates [Harmon10, Eq. 3.8]: impulses may
+    /// pull.
+    InelasticProjection,
+    /// The zone moves as one rigid body [Harmon10, Algorithm 2].
+    RigidZone,
+}
+
+/// Friction within a zone that is projected.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ZoneFriction {
+    /// Each contact within its own limit, with its own coefficient.
+    #[default]
+    PerContact,
+    /// One limit and one coefficient for all sliding of the zone [Harmon10, §3.7].
+    PerZone,
+    /// None.
+    Frictionless,
+}
+
 /// Parts of the method that can be left out, to measure what each is worth; the default leaves nothing out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ablation {
@@ -87,6 +114,10 @@ pub struct Settings {
     pub proximity_factor: f64,
     /// A rigid or kinematic part that turns more than this in a step is subdivided in time `[rad]`.
     pub turn_max: f64,
+    /// What answers zones of collisions that are left.
+    pub fail_safe: FailSafe,
+    /// Friction within projected zones.
+    pub zone_friction: ZoneFriction,
     /// Certify the end state by exact predicates.
     pub certify: bool,
     /// What is left out.
@@ -108,6 +139,8 @@ impl Default for Settings {
             recovery_fraction: 0.1,
             proximity_factor: 2.0,
             turn_max: 0.5,
+            fail_safe: FailSafe::default(),
+            zone_friction: ZoneFriction::default(),
             certify: false,
             ablation: Ablation::default(),
         }

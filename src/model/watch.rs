@@ -11,7 +11,7 @@ pub enum Phase {
     Start,
     /// A round: contacts, constrained dynamics, continuous detection.
     Round,
-    /// Rigid zones and held vertices.
+    /// Zones and held vertices.
     FailSafe,
 }
 

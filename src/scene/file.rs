@@ -106,7 +106,7 @@ pub struct Bounds {
     pub contacts_max: Option<u32>,
     /// Steps that were divided.
     pub divisions_max: Option<u32>,
-    /// Steps with rigid zones or held vertices.
+    /// Steps with zones or held vertices.
     pub fail_safes_max: Option<u32>,
     /// Steps that ended pinched.
     pub pinched_max: Option<u32>,

@@ -31,7 +31,7 @@ pub struct Report {
     pub rounds_within_three: f64,
     /// Steps that were divided.
     pub divisions: u64,
-    /// Steps with rigid zones or held vertices.
+    /// Steps with zones or held vertices.
     pub failsafes: u64,
     /// Steps that ended early.
     pub pinched: u64,

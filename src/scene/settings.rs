@@ -2,7 +2,7 @@
 
 use super::fault::FieldFault;
 use super::file::{not_negative, positive};
-use crate::model::{FrictionCone, Settings, SolverChoice, StartPolicy};
+use crate::model::{FailSafe, FrictionCone, Settings, SolverChoice, StartPolicy, ZoneFriction};
 use serde::Deserialize;
 
 /// Settings of the step; what is not given keeps its default.
@@ -21,6 +21,24 @@ pub struct SettingsTable {
     pub recovery_fraction: Option<f64>,
     pub proximity_factor: Option<f64>,
     pub turn_max: Option<f64>,
+    pub fail_safe: Option<FailSafeName>,
+    pub zone_friction: Option<ZoneFrictionName>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FailSafeName {
+    UnilateralProjection,
+    InelasticProjection,
+    RigidZone,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ZoneFrictionName {
+    PerContact,
+    PerZone,
+    Frictionless,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -68,6 +86,16 @@ impl SettingsTable {
             Start::Refuse => StartPolicy::Refuse,
             Start::Pass => StartPolicy::Pass,
         });
+        let fail_safe = self.fail_safe.map_or(d.fail_safe, |name| match name {
+            FailSafeName::UnilateralProjection => FailSafe::UnilateralProjection,
+            FailSafeName::InelasticProjection => FailSafe::InelasticProjection,
+            FailSafeName::RigidZone => FailSafe::RigidZone,
+        });
+        let zone_friction = self.zone_friction.map_or(d.zone_friction, |name| match name {
+            ZoneFrictionName::PerContact => ZoneFriction::PerContact,
+            ZoneFrictionName::PerZone => ZoneFriction::PerZone,
+            ZoneFrictionName::Frictionless => ZoneFriction::Frictionless,
+        });
         Settings {
             solver,
             friction_cone,
@@ -81,6 +109,8 @@ impl SettingsTable {
             recovery_fraction: self.recovery_fraction.unwrap_or(d.recovery_fraction),
             proximity_factor: self.proximity_factor.unwrap_or(d.proximity_factor),
             turn_max: self.turn_max.unwrap_or(d.turn_max),
+            fail_safe,
+            zone_friction,
             certify: true,
             ablation: d.ablation,
         }

@@ -36,6 +36,7 @@ row! {
     active_contacts: u32,
     rounds: u32,
     parts: u32,
+    projected_zones: u32,
     rigid_zones: u32,
     held_vertices: u32,
     tangled_pairs: u32,
@@ -79,6 +80,7 @@ impl StepRow {
             active_contacts: report.active_contacts,
             rounds: report.rounds,
             parts: report.parts,
+            projected_zones: report.projected_zones,
             rigid_zones: report.rigid_zones,
             held_vertices: report.held_vertices,
             tangled_pairs: report.tangled_pairs,
@@ -109,9 +111,9 @@ impl StepRow {
         self.rounds.div_ceil(self.parts.max(1))
     }
 
-    /// Whether zones moved as rigid bodies or vertices were held.
+    /// Whether zones were projected or moved as rigid bodies, or vertices were held.
     pub fn fail_safe_used(&self) -> bool {
-        self.rigid_zones > 0 || self.held_vertices > 0
+        self.projected_zones > 0 || self.rigid_zones > 0 || self.held_vertices > 0
     }
 }
 

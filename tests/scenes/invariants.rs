@@ -35,7 +35,7 @@ fn check(name: &str, number: usize, facts: &Facts, speed_limit: f64) {
     assert!(facts.balance_error < 1e-10, "{name}: step {number}: {}", facts.balance_error);
     // |v|_A <= |v*|_A up to the residual and the reported recovery work [ALGORITHMS: what is true of energy]. Held
     // vertices and zones leave the metric solution, and are counted by the scenes instead.
-    if r.held_vertices == 0 && r.rigid_zones == 0 {
+    if r.held_vertices == 0 && r.zones() == 0 {
         let slack = 0.02 * facts.energy_free + r.recovery_work.max(0.0);
         assert!(
             facts.energy_gain <= slack,
@@ -54,8 +54,8 @@ pub fn few_rounds(all: &[Facts]) -> f64 {
     few as f64 / touching.len().max(1) as f64
 }
 
-/// Steps that needed a division, a rigid zone or a held vertex.
+/// Steps that needed a division, a zone or a held vertex.
 pub fn fail_safes(all: &[Facts]) -> [usize; 3] {
     let count = |f: fn(&Facts) -> bool| all.iter().filter(|x| f(x)).count();
-    [count(|f| f.report.parts > 1), count(|f| f.report.rigid_zones > 0), count(|f| f.report.held_vertices > 0)]
+    [count(|f| f.report.parts > 1), count(|f| f.report.zones() > 0), count(|f| f.report.held_vertices > 0)]
 }

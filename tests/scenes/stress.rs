@@ -148,7 +148,7 @@ impl Runner<'_> {
         };
         tally.steps += 1;
         tally.divided += usize::from(report.parts > 1);
-        tally.zones += usize::from(report.rigid_zones > 0);
+        tally.zones += usize::from(report.zones() > 0);
         tally.held += usize::from(report.held_vertices > 0);
         tally.not_converged += usize::from(report.not_converged);
         tally.tangled += usize::from(report.tangled_pairs > 0);
@@ -292,7 +292,9 @@ impl Runner<'_> {
         if lumped && !pinched && norm(sub(gained, given)) > 1e-9 * size + rounding {
             faults.push(format!(
                 "impulses are not momentum gained: {gained:?} {given:?} size {size:e} parts {} zones {} held {}",
-                report.parts, report.rigid_zones, report.held_vertices
+                report.parts,
+                report.zones(),
+                report.held_vertices
             ));
         }
         let balance = norm(add(given, report.momentum_taken));
@@ -300,7 +302,10 @@ impl Runner<'_> {
         if lumped && balance > 1e-9 * impulse_size + rounding {
             faults.push(format!(
                 "momentum lost: given {given:?} taken {:?} parts {} zones {} held {} pinched {pinched}",
-                report.momentum_taken, report.parts, report.rigid_zones, report.held_vertices
+                report.momentum_taken,
+                report.parts,
+                report.zones(),
+                report.held_vertices
             ));
         }
         let still = !scene.parts.iter().enumerate().any(|(i, _)| scripted_moves(scene, i, before, drives))
@@ -319,7 +324,8 @@ impl Runner<'_> {
             {
                 faults.push(format!(
                     "ENERGY: {free:e} -> {after:e} zones {} held {}",
-                    report.rigid_zones, report.held_vertices
+                    report.zones(),
+                    report.held_vertices
                 ));
             }
         }

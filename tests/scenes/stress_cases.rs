@@ -367,7 +367,7 @@ fn settle(scene: &Scene, gravity: Vec3, steps: usize) -> (World, u32, u32, f64) 
         let report = outcome.unwrap_or_else(|e| panic!("step {step}: {e:?}"));
         assert_eq!(report.intersections, Some(0), "step {step}");
         divided += u32::from(report.parts > 1);
-        fail_safes += report.rigid_zones + report.held_vertices;
+        fail_safes += report.zones() + report.held_vertices;
     }
     let speed = world.result.velocities.iter().fold(0.0, |m: f64, v| m.max(norm(*v)));
     (world, divided, fail_safes, speed)

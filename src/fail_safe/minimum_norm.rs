@@ -1,0 +1,115 @@
+//! The smallest vector that meets equations which may repeat or contradict each other.
+
+use super::zone_rows::{ZoneRows, inner};
+use crate::math::{Vec3, add_scaled, scale};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// Rank cut: directions whose singular value is below this share of the largest one are left out. Rows are unit vectors.
+pub(super) const RANK_CUT: f64 = 1e-6;
+
+/// Rows up to which the spectrum is computed; more are solved by bidiagonalisation.
+const DENSE_ROWS: usize = 64;
+
+/// Sweeps of the symmetric eigenvalue iteration at most, per row.
+const EIGEN_SWEEPS: usize = 64;
+
+/// Residual, relative to the right side, at which bidiagonalisation ends.
+const TOLERANCE: f64 = 1e-13;
+
+/// A solution of `A y = r` with its multipliers: `y = A^T lambda`.
+pub(super) struct MinimumNorm {
+    pub y: Vec<Vec3>,
+    pub multipliers: Vec<f64>,
+    /// Directions used; by bidiagonalisation, its steps.
+    pub rank: usize,
+}
+
+/// The least-squares solution of `A y = r` of smallest norm, at the rank cut.
+///
+/// Few rows: by the eigenvectors of `A A^T`, refined once. Many: by the bidiagonalisation of Golub and Kahan in the form
+/// of Paige and Saunders, at most four steps a row; there the cut is what that many steps do not reach. Cost: cubic in
+/// few rows, else linear in entries times steps.
+pub(super) fn minimum_norm(rows: &ZoneRows, right: &[f64]) -> MinimumNorm {
+    if rows.len() <= DENSE_ROWS
+        && let Some(solution) = by_spectrum(rows, right)
+    {
+        return solution;
+    }
+    by_bidiagonalisation(rows, right)
+}
+
+fn by_spectrum(rows: &ZoneRows, right: &[f64]) -> Option<MinimumNorm> {
+    let n = rows.len();
+    let matrix = DMatrix::from_fn(n, n, |i, j| rows.inner_product(i.min(j), i.max(j)));
+    let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, EIGEN_SWEEPS * n.max(1))?;
+    let largest = eigen.eigenvalues.iter().fold(0.0_f64, |m, v| m.max(*v));
+    let kept: Vec<usize> = (0..n).filter(|i| eigen.eigenvalues[*i] > RANK_CUT * RANK_CUT * largest).collect();
+    let solve = |r: &DVector<f64>| {
+        let mut lambda = DVector::zeros(n);
+        for i in &kept {
+            let vector = eigen.eigenvectors.column(*i);
+            lambda.axpy(vector.dot(r) / eigen.eigenvalues[*i], &vector, 1.0);
+        }
+        lambda
+    };
+    let r = DVector::from_column_slice(right);
+    let mut lambda = solve(&r);
+    let y = rows.transposed_product(lambda.as_slice());
+    let left = DVector::from_fn(n, |i, _| r[i] - rows.product(i, &y));
+    lambda += solve(&left);
+    let y = rows.transposed_product(lambda.as_slice());
+    Some(MinimumNorm { y, multipliers: lambda.as_slice().to_vec(), rank: kept.len() })
+}
+
+/// LSQR, which also keeps each direction's multipliers.
+fn by_bidiagonalisation(rows: &ZoneRows, right: &[f64]) -> MinimumNorm {
+    let n = rows.len();
+    let mut multipliers = vec![0.0; n];
+    let normalise = |x: &mut [f64]| {
+        let length = x.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let inverse = if length > 0.0 { 1.0 / length } else { 0.0 };
+        x.iter_mut().for_each(|v| *v *= inverse);
+        length
+    };
+    let mut u = right.to_vec();
+    let start = normalise(&mut u);
+    let mut v = rows.transposed_product(&u);
+    let mut alpha = inner(&v, &v).sqrt();
+    let mut steps = 0;
+    if start > 0.0 && alpha > 0.0 {
+        v.iter_mut().for_each(|x| *x = scale(1.0 / alpha, *x));
+        // v = A^T p, and the direction of search is A^T w.
+        let mut p: Vec<f64> = u.iter().map(|x| x / alpha).collect();
+        let mut w = p.clone();
+        let (mut phi, mut rho) = (start, alpha);
+        let mut frobenius = alpha * alpha;
+        while steps < 4 * n {
+            steps += 1;
+            for i in 0..n {
+                u[i] = rows.product(i, &v) - alpha * u[i];
+            }
+            let beta = normalise(&mut u);
+            let image = rows.transposed_product(&u);
+            v.iter_mut().zip(&image).for_each(|(x, a)| *x = add_scaled(*a, -beta, *x));
+            alpha = inner(&v, &v).sqrt();
+            let inverse = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
+            v.iter_mut().for_each(|x| *x = scale(inverse, *x));
+            p.iter_mut().zip(&u).for_each(|(p, u)| *p = inverse * (u - beta * *p));
+            let length = rho.hypot(beta);
+            let (cosine, sine) = (rho / length, beta / length);
+            let (theta, step) = (sine * alpha, cosine * phi);
+            rho = -cosine * alpha;
+            phi *= sine;
+            frobenius += alpha * alpha + beta * beta;
+            for i in 0..n {
+                multipliers[i] += step / length * w[i];
+                w[i] = p[i] - theta / length * w[i];
+            }
+            let gradient = phi * alpha * cosine.abs();
+            if phi <= TOLERANCE * start || gradient <= TOLERANCE * frobenius.sqrt() * phi || alpha == 0.0 {
+                break;
+            }
+        }
+    }
+    MinimumNorm { y: rows.transposed_product(&multipliers), multipliers, rank: steps }
+}
