@@ -7,8 +7,11 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// Rank cut: directions whose singular value is below this share of the largest one are left out. Rows are unit vectors.
 pub(super) const RANK_CUT: f64 = 1e-6;
 
-/// Rows up to which the spectrum is computed; more are solved by bidiagonalisation.
-const DENSE_ROWS: usize = 64;
+/// Rows up to which matrices are dense and the spectrum is computed; more are solved by bidiagonalisation.
+pub(super) const DENSE_ROWS: usize = 128;
+
+/// Bidiagonalisations at most, each from what the last one left: orthogonality that rounding took is made anew.
+const RESTARTS: usize = 3;
 
 /// Sweeps of the symmetric eigenvalue iteration at most, per row.
 const EIGEN_SWEEPS: usize = 64;
@@ -27,15 +30,23 @@ pub(super) struct MinimumNorm {
 /// The least-squares solution of `A y = r` of smallest norm, at the rank cut.
 ///
 /// Few rows: by the eigenvectors of `A A^T`, refined once. Many: by the bidiagonalisation of Golub and Kahan in the form
-/// of Paige and Saunders, at most four steps a row; there the cut is what that many steps do not reach. Cost: cubic in
-/// few rows, else linear in entries times steps.
+/// of Paige and Saunders, at most three times four steps a row; there the cut is what that many steps do not reach. Cost:
+/// cubic in few rows, else linear in entries times steps.
 pub(super) fn minimum_norm(rows: &ZoneRows, right: &[f64]) -> MinimumNorm {
     if rows.len() <= DENSE_ROWS
         && let Some(solution) = by_spectrum(rows, right)
     {
         return solution;
     }
-    by_bidiagonalisation(rows, right)
+    let mut solution = by_bidiagonalisation(rows, right);
+    for _ in 1..RESTARTS {
+        let left: Vec<f64> = (0..rows.len()).map(|i| right[i] - rows.product(i, &solution.y)).collect();
+        let next = by_bidiagonalisation(rows, &left);
+        solution.multipliers.iter_mut().zip(&next.multipliers).for_each(|(sum, l)| *sum += l);
+        solution.y = rows.transposed_product(&solution.multipliers);
+        solution.rank = solution.rank.max(next.rank);
+    }
+    solution
 }
 
 fn by_spectrum(rows: &ZoneRows, right: &[f64]) -> Option<MinimumNorm> {

@@ -1,11 +1,16 @@
 //! The smallest change of velocities after which no row falls short: impulses push and never pull [Harmon10, §3.5].
 
-use super::minimum_norm::minimum_norm;
+use super::minimum_norm::{DENSE_ROWS, minimum_norm};
 use super::zone_rows::{ZoneRows, inner};
 use crate::math::{Vec3, add_scaled, scale};
+use nalgebra::{DMatrix, DVector};
 
-/// Penalties, relative to unit rows, from the first update of the multipliers to the last kind.
+/// Penalties, relative to unit rows, from the first update of the multipliers on; the last one stays. Conjugate gradients
+/// bear less than a factor does.
 const PENALTIES: [f64; 5] = [1e1, 1e2, 1e3, 1e4, 1e5];
+
+/// The same where Newton's systems are factored.
+const PENALTIES_FACTORED: [f64; 4] = [1e2, 1e4, 1e6, 1e8];
 
 /// Updates of the multipliers at most.
 const UPDATES: usize = 40;
@@ -28,6 +33,9 @@ pub(super) const TOLERANCE: f64 = 1e-11;
 /// Complementarity below which the rows that push are trusted, and solved as equations.
 const TRUSTED: f64 = 1e-4;
 
+/// Times that rows which fall short join those that push.
+const REPAIRS: usize = 4;
+
 /// Halvings of a Newton step at most.
 const HALVINGS: usize = 30;
 
@@ -43,13 +51,14 @@ pub(super) struct Unilateral {
 /// The smallest `y` with `A y >= demand`.
 ///
 /// The complementarity problem that simplex methods could not solve robustly [Harmon10, §3.5] is the projection onto a
-/// convex cone. The method of multipliers makes it a sequence of smooth convex problems, each solved by Newton steps with
-/// conjugate gradients and a line search; rows that repeat or contradict each other leave all of these well posed.
+/// convex cone. The method of multipliers makes it a sequence of smooth convex problems, each solved by Newton steps
+/// (factored for few rows, else by conjugate gradients) with a line search; rows that repeat or contradict each other leave all of these well posed.
 /// Once the set of pushing rows has settled they are solved as equations, which removes what the iteration leaves. Rows
 /// that cannot be met end at the work cap, near their least squares. Cost: at most 40 updates, 200 Newton steps of 400
 /// iterations.
 pub(super) fn unilateral(rows: &ZoneRows, demand: &[f64]) -> Unilateral {
     let size = demand.iter().fold(0.0_f64, |m, c| m.max(*c));
+    let penalties: &[f64] = if rows.len() <= DENSE_ROWS { &PENALTIES_FACTORED } else { &PENALTIES };
     let mut state = Multipliers { y: vec![[0.0; 3]; rows.width], lambda: vec![0.0; rows.len()] };
     let mut steps = 0;
     let mut polished_at = f64::INFINITY;
@@ -61,16 +70,16 @@ pub(super) fn unilateral(rows: &ZoneRows, demand: &[f64]) -> Unilateral {
         }
         if complementarity <= TRUSTED && complementarity < 1e-2 * polished_at {
             polished_at = complementarity;
-            if let Some(solution) = polished(rows, demand, &state.lambda, TOLERANCE * size) {
+            if let Some(solution) = polished(rows, demand, &state.lambda, size) {
                 return solution;
             }
         }
-        let stalls = update >= PENALTIES.len() && complementarity > PROGRESS * last;
+        let stalls = update >= penalties.len() && complementarity > PROGRESS * last;
         if stalls || steps >= NEWTON_STEPS {
             break;
         }
         last = complementarity;
-        let sigma = PENALTIES[update.min(PENALTIES.len() - 1)];
+        let sigma = penalties[update.min(penalties.len() - 1)];
         let tolerance = 1e-2 * size * complementarity.min(1.0);
         steps += state.minimise(rows, demand, sigma, NEWTON_STEPS - steps, tolerance);
         for i in 0..rows.len() {
@@ -81,22 +90,40 @@ pub(super) fn unilateral(rows: &ZoneRows, demand: &[f64]) -> Unilateral {
     state.finished(rows, converged)
 }
 
-/// The rows that push, solved as equations; `None` where some then pull or another row falls short.
-fn polished(rows: &ZoneRows, demand: &[f64], lambda: &[f64], tolerance: f64) -> Option<Unilateral> {
-    let active: Vec<usize> = (0..rows.len()).filter(|i| lambda[*i] > 0.0).collect();
-    let right: Vec<f64> = active.iter().map(|i| demand[*i]).collect();
-    let solution = minimum_norm(&rows.selected(&active), &right);
-    let pulls = solution.multipliers.iter().any(|l| *l < -tolerance);
-    let short = (0..rows.len()).any(|i| rows.product(i, &solution.y) < demand[i] - tolerance);
-    if pulls || short {
-        return None;
+/// The rows that push, and those that then fall short, solved as equations; `None` where that is another motion, or some
+/// row still falls short.
+fn polished(rows: &ZoneRows, demand: &[f64], lambda: &[f64], size: f64) -> Option<Unilateral> {
+    let tolerance = TOLERANCE * size;
+    let before = rows.transposed_product(lambda);
+    let mut pushes: Vec<bool> = lambda.iter().map(|l| *l > 0.0).collect();
+    for _ in 0..REPAIRS {
+        let active: Vec<usize> = (0..rows.len()).filter(|i| pushes[*i]).collect();
+        let right: Vec<f64> = active.iter().map(|i| demand[*i]).collect();
+        let solution = minimum_norm(&rows.selected(&active), &right);
+        let short = |i: &usize| rows.product(*i, &solution.y) < demand[*i] - tolerance;
+        let missed: Vec<usize> = (0..rows.len()).filter(short).collect();
+        if missed.iter().any(|i| pushes[*i]) {
+            return None;
+        }
+        if !missed.is_empty() {
+            missed.into_iter().for_each(|i| pushes[i] = true);
+            continue;
+        }
+        // Rows that repeat each other have many multipliers, of which the smallest may pull: then those of the iteration
+        // stand for them, as long as they move the same.
+        let pulls = solution.multipliers.iter().any(|l| *l < -tolerance);
+        let change: Vec<Vec3> = solution.y.iter().zip(&before).map(|(a, b)| add_scaled(*a, -1.0, *b)).collect();
+        if pulls && inner(&change, &change) > TRUSTED * TRUSTED * inner(&before, &before) {
+            return None;
+        }
+        let mut multipliers = lambda.to_vec();
+        if !pulls {
+            multipliers.fill(0.0);
+            active.iter().zip(&solution.multipliers).for_each(|(i, l)| multipliers[*i] = l.max(0.0));
+        }
+        return Some(Unilateral { y: solution.y, multipliers, active: active.len(), converged: true });
     }
-    let mut multipliers = vec![0.0; rows.len()];
-    for (i, l) in active.iter().zip(&solution.multipliers) {
-        multipliers[*i] = l.max(0.0);
-    }
-    let y = rows.transposed_product(&multipliers);
-    Some(Unilateral { y, multipliers, active: active.len(), converged: true })
+    None
 }
 
 struct Multipliers {
@@ -166,8 +193,31 @@ impl Multipliers {
     }
 }
 
-/// `-(I + sigma A_S^T A_S)^-1 gradient` by conjugate gradients.
+/// `-(I + sigma A_S^T A_S)^-1 gradient`
 fn newton_direction(rows: &ZoneRows, active: &[usize], sigma: f64, gradient: &[Vec3]) -> Vec<Vec3> {
+    if rows.len() <= DENSE_ROWS
+        && let Some(direction) = by_factor(rows, active, sigma, gradient)
+    {
+        return direction;
+    }
+    by_conjugate_gradients(rows, active, sigma, gradient)
+}
+
+/// By a factor of `A_S A_S^T + I/sigma`, which is as small as there are rows.
+fn by_factor(rows: &ZoneRows, active: &[usize], sigma: f64, gradient: &[Vec3]) -> Option<Vec<Vec3>> {
+    let n = active.len();
+    let entry = |i: usize, j: usize| {
+        let shift = if i == j { 1.0 / sigma } else { 0.0 };
+        rows.inner_product(active[i.min(j)], active[i.max(j)]) + shift
+    };
+    let factor = DMatrix::from_fn(n, n, entry).cholesky()?;
+    let load = factor.solve(&DVector::from_fn(n, |i, _| rows.product(active[i], gradient)));
+    let mut direction: Vec<Vec3> = gradient.iter().map(|g| scale(-1.0, *g)).collect();
+    active.iter().zip(load.iter()).for_each(|(i, l)| rows.add_row(*i, *l, &mut direction));
+    Some(direction)
+}
+
+fn by_conjugate_gradients(rows: &ZoneRows, active: &[usize], sigma: f64, gradient: &[Vec3]) -> Vec<Vec3> {
     let apply = |d: &[Vec3]| {
         let mut out = d.to_vec();
         active.iter().for_each(|i| rows.add_row(*i, sigma * rows.product(*i, d), &mut out));

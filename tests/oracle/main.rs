@@ -12,6 +12,7 @@ mod intersection;
 #[allow(dead_code, unused_imports)]
 #[path = "../../benches/support/mod.rs"]
 mod problem_files;
+mod projections;
 mod proximity;
 mod scenes;
 mod screening;

@@ -12,7 +12,7 @@ use signorini::parallel::{Par, Pool};
 /// The frictionless velocities by a quadratic program: minimise `dv^T A dv / 2` subject to `J dv >= c`.
 ///
 /// `polish` goes on to the exact optimum on the active set, for small problems without redundant rows.
-fn interior_point(made: &Made, polish: bool) -> Vec<Vec3> {
+pub fn interior_point(made: &Made, polish: bool) -> Vec<Vec3> {
     let blocks = made.matrix.rows();
     // Blocks of infinite mass have no variables.
     let mut first = vec![usize::MAX; blocks];
