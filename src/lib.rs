@@ -19,7 +19,9 @@
 //! | [`contact_search`] | contacts with body ids and persistent keys |
 //! | [`constraint`] | contacts as rows over the degrees of freedom |
 //! | [`fail_safe`] | zones (projections, rigid zones) and hold |
+//! | [`step`] | the stages of a step that every method shares |
 //! | [`implicit_contact`] | constraint manifold refinement around iterative constraint anticipation |
+//! | [`velocity_filter`] | repulsions, impulses, zones |
 //! | [`world`] | bodies by id, the step, queries |
 //! | [`capi`] | the C ABI |
 //! | `scene` | scene files and the runner, with the cargo feature `runner` |
@@ -44,4 +46,6 @@ pub mod model;
 pub mod parallel;
 #[cfg(feature = "runner")]
 pub mod scene;
+pub mod step;
+pub mod velocity_filter;
 pub mod world;

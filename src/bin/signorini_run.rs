@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 const USAGE: &str = "usage: signorini-run SCENE.toml [options]
-  --method NAME      contact method: implicit
+  --method NAME      contact method: implicit, filter
   --steps N          stop after step N
   --threads N        worker threads (the results do not depend on it)
   --out DIR          write frames, animation.usda, stats.csv, report.json, last.snapshot

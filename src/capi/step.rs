@@ -9,7 +9,8 @@ use super::status::{
 use super::structs::{self, Growing};
 use super::world::SgnWorld;
 use crate::model::{
-    FailSafe, FrictionCone, Phase, Settings, SolverChoice, StartPolicy, StepReport, Watch, ZoneFriction,
+    FailSafe, FilterSettings, FrictionCone, Method, Phase, Settings, SolverChoice, StartPolicy, StepReport, Watch,
+    ZoneFriction,
 };
 use std::ffi::c_void;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub type SgnMethod = i32;
 /// Implicit contact: constraint manifold refinement around iterative constraint anticipation. The default.
 pub const SGN_METHOD_IMPLICIT: i32 = 0;
-/// Reserved: velocity filter. `SGN_ERROR_UNSUPPORTED` in this version.
+/// Velocity filter: repulsions, impulses with restitution, zones. Reads no system values, response is by lumped masses.
 pub const SGN_METHOD_VELOCITY_FILTER: i32 = 1;
 /// Reserved: asynchronous contact. `SGN_ERROR_UNSUPPORTED` in this version.
 pub const SGN_METHOD_ASYNCHRONOUS: i32 = 2;
@@ -78,7 +79,7 @@ pub type SgnPhase = i32;
 pub const SGN_PHASE_DYNAMICS: i32 = 0;
 /// The start state is checked.
 pub const SGN_PHASE_START: i32 = 1;
-/// A round: contacts, constrained dynamics, continuous detection.
+/// A round: contacts, constrained dynamics, continuous detection; or a pass of impulses.
 pub const SGN_PHASE_ROUND: i32 = 2;
 /// Zones and held vertices.
 pub const SGN_PHASE_FAIL_SAFE: i32 = 3;
@@ -132,12 +133,21 @@ pub struct SgnStepDesc {
     pub fail_safe: SgnFailSafe,
     /// An `SGN_ZONE_FRICTION_` constant.
     pub zone_friction: SgnZoneFriction,
+    /// Velocity filter: coefficient of restitution of collisions, 0 to 1. Default: 0.
+    pub restitution: f64,
+    /// Velocity filter: stiffness of the springs between what is closer than its thickness, in units of effective mass over
+    /// `dt^2`, 0 to 1e6; 1 makes up for the whole overlap in a step, but for the cap of `recovery_fraction`. 0: no springs.
+    pub repulsion_stiffness: f64,
+    /// Velocity filter: passes of impulses and continuous detection before the fail-safes, at most 1e6.
+    pub passes_max: u32,
+    /// Must be 0.
+    pub reserved: u32,
 }
 
 // SAFETY: repr(C) without padding; numbers, a pointer and a nullable function.
 unsafe impl Growing for SgnStepDesc {
     const NAME: &'static str = "SgnStepDesc";
-    const FIRST_SIZE: usize = 112;
+    const FIRST_SIZE: usize = 136;
     fn defaults() -> Self {
         let s = Settings::default();
         SgnStepDesc {
@@ -160,6 +170,10 @@ unsafe impl Growing for SgnStepDesc {
             progress_user: std::ptr::null_mut(),
             fail_safe: SGN_FAIL_SAFE_UNILATERAL_PROJECTION,
             zone_friction: SGN_ZONE_FRICTION_PER_CONTACT,
+            restitution: s.filter.restitution,
+            repulsion_stiffness: s.filter.repulsion_stiffness,
+            passes_max: s.filter.passes_max,
+            reserved: 0,
         }
     }
 }
@@ -191,13 +205,14 @@ fn invalid(what: &str, value: f64) -> Failure {
 
 impl SgnStepDesc {
     fn settings(&self) -> Result<Settings, Failure> {
-        match self.method {
-            SGN_METHOD_IMPLICIT => {}
-            SGN_METHOD_VELOCITY_FILTER | SGN_METHOD_ASYNCHRONOUS => {
-                return Err(Failure::new(SGN_ERROR_UNSUPPORTED, "this version has the implicit method only"));
+        let method = match self.method {
+            SGN_METHOD_IMPLICIT => Method::ImplicitContact,
+            SGN_METHOD_VELOCITY_FILTER => Method::VelocityFilter,
+            SGN_METHOD_ASYNCHRONOUS => {
+                return Err(Failure::new(SGN_ERROR_UNSUPPORTED, "this version has no asynchronous method"));
             }
             other => return Err(invalid("method", f64::from(other))),
-        }
+        };
         if self.flags & !SGN_STEP_CERTIFY != 0 {
             return Err(invalid("flags", self.flags as f64));
         }
@@ -229,12 +244,25 @@ impl SgnStepDesc {
             ("recovery_fraction", self.recovery_fraction, 0.0, 1.0),
             ("proximity_factor", self.proximity_factor, 1.0, 1e6),
             ("turn_max", self.turn_max, f64::MIN_POSITIVE, 4.0),
+            ("restitution", self.restitution, 0.0, 1.0),
+            ("repulsion_stiffness", self.repulsion_stiffness, 0.0, 1e6),
+            ("passes_max", f64::from(self.passes_max), 0.0, 1e6),
         ] {
             if !(low..=high).contains(&value) {
                 return Err(invalid(what, value));
             }
         }
+        if self.reserved != 0 {
+            return Err(invalid("reserved", f64::from(self.reserved)));
+        }
+        let filter = FilterSettings {
+            restitution: self.restitution,
+            repulsion_stiffness: self.repulsion_stiffness,
+            passes_max: self.passes_max,
+        };
         Ok(Settings {
+            method,
+            filter,
             solver,
             friction_cone,
             start_policy,
@@ -273,9 +301,9 @@ pub struct SgnStepReport {
     pub contacts: u32,
     /// Contacts with an impulse.
     pub active_contacts: u32,
-    /// Rounds of constraint manifold refinement, summed over the parts of the step.
+    /// Rounds of constraint manifold refinement, or passes of the velocity filter, summed over the parts of the step.
     pub rounds: u32,
-    /// Outer solver iterations, summed.
+    /// Outer solver iterations, or impulses of the velocity filter, summed.
     pub iterations: u32,
     /// Parts that the step was divided into; 1 when it was not.
     pub parts: u32,
@@ -297,7 +325,7 @@ pub struct SgnStepReport {
     pub friction_residual: f64,
     /// Dynamics residual, relative; worst of the step.
     pub dynamics_residual: f64,
-    /// Work done by thickness recovery.
+    /// Work done by thickness recovery; by springs of the velocity filter at most.
     pub recovery_work: f64,
     /// Momentum taken by held zones and infinite masses.
     pub momentum_taken: [f64; 3],

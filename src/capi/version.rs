@@ -3,7 +3,7 @@
 use super::boundary::call;
 use super::context::{SGN_EXECUTOR_POOL, SGN_EXECUTOR_SERIAL};
 use super::status::{Failure, SGN_ERROR_UNSUPPORTED, SGN_OK, SgnResult, name};
-use super::step::SGN_METHOD_IMPLICIT;
+use super::step::{SGN_METHOD_IMPLICIT, SGN_METHOD_VELOCITY_FILTER};
 use super::structs::{self, Growing};
 use std::ffi::c_char;
 
@@ -89,7 +89,7 @@ pub unsafe extern "C" fn sgn_query(capability: SgnCapability, out: *mut i64) -> 
     call(|| {
         let value = match capability {
             SGN_CAPABILITY_EXECUTORS => (1 << SGN_EXECUTOR_SERIAL) | (1 << SGN_EXECUTOR_POOL),
-            SGN_CAPABILITY_METHODS => 1 << SGN_METHOD_IMPLICIT,
+            SGN_CAPABILITY_METHODS => 1 << SGN_METHOD_IMPLICIT | 1 << SGN_METHOD_VELOCITY_FILTER,
             SGN_CAPABILITY_DETERMINISTIC => 1,
             SGN_CAPABILITY_SNAPSHOT_FORMAT => i64::from(crate::world::SNAPSHOT_FORMAT),
             SGN_CAPABILITY_WORKERS_MAX => 1024,

@@ -26,4 +26,4 @@ pub use pair::{
     is_immovable, weighted,
 };
 pub use passing::Passing;
-pub use swept::{Hit, minimum_separation, swept_hits};
+pub use swept::{Hit, minimum_separation, renewed_hits, swept_hits};

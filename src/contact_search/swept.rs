@@ -61,6 +61,41 @@ pub fn swept_hits(
     hits
 }
 
+/// The hits of a motion of which a test knew another end, by testing only pairs of which a vertex has `moved` since: the
+/// same as [`swept_hits`], in the same order.
+///
+/// `before` are the hits of that test, from the same start. Cost: a pass over the candidates, and continuous detection of
+/// those that touch a moved vertex.
+pub fn renewed_hits(
+    model: &Model,
+    filter: &BodyFilter,
+    passing: &Passing,
+    candidates: &Candidates,
+    (start, end): (&State, &State),
+    before: &[Hit],
+    moved: &[bool],
+    par: Par,
+) -> Vec<Hit> {
+    let touches = |vertices: &[u32]| vertices.iter().any(|v| moved[*v as usize]);
+    let pairs = |list: &[[u32; 2]], kind: PairKind| -> Vec<[u32; 2]> {
+        let own = list.iter().filter(|features| touches(&Pair { kind, features: **features }.vertices(model)));
+        own.copied().collect()
+    };
+    let open = Candidates {
+        vertex_face: pairs(&candidates.vertex_face, PairKind::VertexFace),
+        edge_edge: pairs(&candidates.edge_edge, PairKind::EdgeEdge),
+        ..Candidates::default()
+    };
+    let mut hits = swept_hits(model, filter, passing, &open, start, end, par);
+    // Half-spaces are all tested anew: that costs less than to sort them out.
+    let on_mesh = |hit: &Hit| hit.pair.kind != PairKind::VertexHalfSpace;
+    let half_spaces = hits.split_off(hits.partition_point(on_mesh));
+    hits.extend(before.iter().filter(|hit| on_mesh(hit) && !touches(&hit.pair.vertices(model))));
+    hits.sort_unstable_by_key(|hit| hit.pair);
+    hits.extend(half_spaces);
+    hits
+}
+
 /// The separation that continuous detection keeps for a pair: half of `min(thickness, start distance)`.
 #[inline]
 pub fn minimum_separation(thickness: f64, start_distance: f64) -> f64 {

@@ -6,6 +6,7 @@ use crate::constraint::BuiltRows;
 use crate::contact_search::{Contact, Hit, Pair};
 use crate::math::{Vec3, dot};
 use crate::model::{FrictionCone, Model, Settings};
+use crate::step::Solved;
 
 /// Share of the required gap that an existing row may miss before a hit of its pair is blamed on the solver.
 const MISSED_SHARE: f64 = 0.05;
@@ -16,17 +17,6 @@ const RESTING_SHARE: f64 = 1.1;
 
 /// Share of the friction limit within which a contact sticks.
 const WELL_WITHIN: f64 = 1.0 - 1e-6;
-
-/// What the last solve gave a contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Solved {
-    /// Impulse on the first primitive, world frame `[N s]`.
-    pub impulse: Vec3,
-    /// First tangent of its friction frame.
-    pub tangent: Vec3,
-    /// It pushes, and its friction is inside the limit.
-    pub sticks: bool,
-}
 
 /// Contacts, the gaps they must keep, and what is known of their impulses.
 #[derive(Clone, Debug, Default)]

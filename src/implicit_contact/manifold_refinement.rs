@@ -1,12 +1,13 @@
 //! Constraint manifold refinement of one segment [Otaduy09, §4, steps 3 and 4].
 
 use super::constraint_set::ConstraintSet;
-use super::{ContactProblem, Memory, Scratch, SolverReport, SolverScratch, solve};
+use super::{ContactProblem, Memory, SolverReport, SolverScratch, solve};
 use crate::constraint::{BuiltRows, Linearisation, Metric, build_rows};
-use crate::contact_search::{BodyFilter, Hit, Passing, near_contacts, swept_hits};
+use crate::contact_search::{CandidateSearch, Hit, Passing, near_contacts, swept_hits};
 use crate::math::{Vec3, add, mat_vec, norm, scale, sub};
-use crate::model::{Phase, Precision, Segment, Settings, State, StepError, Watch};
+use crate::model::{Phase, Precision, Segment, Settings, State, StepError, StepReport};
 use crate::parallel::Par;
+use crate::step::{PartEnd, SolvedContact, Surroundings, lap};
 use std::time::Instant;
 
 /// Factor of the tolerances when the solver missed a row that continuous detection then hit.
@@ -37,15 +38,6 @@ const LINEARISATION_SHARE: f64 = 0.02;
 /// A clean end that leaves a watched pair less than this share of its thickness is refined once more.
 const ADMITTED_SHARE: f64 = 0.98;
 
-/// What stays the same over the segments of a step.
-pub(super) struct Surroundings<'a> {
-    pub metric: &'a Metric,
-    pub filter: &'a BodyFilter,
-    pub settings: &'a Settings,
-    pub par: Par<'a>,
-    pub watch: Watch<'a>,
-}
-
 /// A tentative end of a segment, clean if `hits` is empty.
 #[derive(Clone, Default)]
 pub(super) struct Refined {
@@ -63,37 +55,33 @@ pub(super) struct Refined {
     pub hits: Vec<Hit>,
 }
 
-/// What the rounds of a segment cost and how well they were solved.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct RoundAccount {
-    pub rounds: u32,
-    pub iterations: u32,
-    pub not_converged: bool,
-    pub complementarity: f64,
-    pub friction: f64,
-    pub dynamics: f64,
-    pub search: f64,
-    pub rows: f64,
-    pub solve: f64,
-    pub detection: f64,
-}
-
-impl RoundAccount {
-    fn add(&mut self, report: &SolverReport) {
-        self.iterations += report.iterations;
-        self.not_converged |= !report.converged;
-        self.complementarity = self.complementarity.max(report.complementarity_residual);
-        self.friction = self.friction.max(report.friction_residual);
-        self.dynamics = self.dynamics.max(report.dynamics_residual);
+impl Refined {
+    /// The end that the refinement hands on.
+    pub fn part_end(self) -> PartEnd {
+        let set = self.set;
+        let mut is_row = vec![false; set.contacts.len()];
+        self.built.contact.iter().for_each(|contact| is_row[*contact as usize] = true);
+        let each = set.contacts.into_iter().zip(set.required_gaps).zip(set.solved).zip(is_row);
+        let contacts = each
+            .map(|(((contact, required_gap), solved), is_row)| SolvedContact { contact, required_gap, solved, is_row })
+            .collect();
+        PartEnd {
+            velocities: self.velocities,
+            block_impulses: self.block_impulses,
+            end: self.end,
+            contacts,
+            hits: self.hits,
+        }
     }
 }
 
-/// Microseconds since `from`, which is set to now.
-pub(super) fn lap(from: &mut Instant) -> f64 {
-    let now = Instant::now();
-    let microseconds = now.duration_since(*from).as_secs_f64() * 1e6;
-    *from = now;
-    microseconds
+/// Adds what a solve did to the report of the step.
+fn book(solve: &SolverReport, report: &mut StepReport) {
+    report.iterations += solve.iterations;
+    report.not_converged |= !solve.converged;
+    report.complementarity_residual = report.complementarity_residual.max(solve.complementarity_residual);
+    report.friction_residual = report.friction_residual.max(solve.friction_residual);
+    report.dynamics_residual = report.dynamics_residual.max(solve.dynamics_residual);
 }
 
 /// Refines the constraint manifold until the tentative end is clean or the rounds are used up. Errors: cancelled.
@@ -102,8 +90,9 @@ pub(super) fn refine(
     segment: &Segment,
     passing: &Passing,
     memory: &Memory,
-    scratch: &mut Scratch,
-    account: &mut RoundAccount,
+    solver: &mut SolverScratch,
+    search: &mut CandidateSearch,
+    report: &mut StepReport,
 ) -> Result<Refined, StepError> {
     let (model, par) = (segment.model, around.par);
     let mut settings = *around.settings;
@@ -113,7 +102,7 @@ pub(super) fn refine(
     segment.end_state(&refined.velocities, 1.0, false, &mut linear_end);
     let factor = settings.proximity_factor.max(1.0);
     let x0 = &segment.start.positions;
-    let candidates = scratch.candidates.update(model, around.filter, x0, &linear_end.positions, factor, par);
+    let candidates = search.update(model, around.filter, x0, &linear_end.positions, factor, par);
     let near = if settings.ablation.near_contacts {
         near_contacts(model, around.filter, passing, candidates, segment.start, &linear_end, factor, par)
     } else {
@@ -121,7 +110,7 @@ pub(super) fn refine(
     };
     refined.set = ConstraintSet::new(model, near, memory, &settings, segment.dt);
     refined.set.admit(model, &linear_end.positions, 1.0, memory, &settings, segment.dt);
-    account.search += lap(&mut clock);
+    report.times.search += lap(&mut clock);
     let scale_of_motion = fastest(x0, &linear_end.positions, segment.dt);
     let mut tolerance_factor = 1.0;
     let mut tightened = false;
@@ -130,7 +119,7 @@ pub(super) fn refine(
     while rounds_left > 0 {
         around.watch.ask(Phase::Round, segment.from)?;
         rounds_left -= 1;
-        account.rounds += 1;
+        report.rounds += 1;
         let converged = solve_round(
             around,
             segment,
@@ -139,15 +128,15 @@ pub(super) fn refine(
             tolerance_factor,
             memory,
             &mut refined,
-            scratch,
-            account,
+            solver,
+            report,
         );
         clock = Instant::now();
         segment.end_state(&refined.velocities, 1.0, true, &mut refined.end);
         let x1 = &refined.end.positions;
-        let candidates = scratch.candidates.update(model, around.filter, x0, x1, factor, par);
+        let candidates = search.update(model, around.filter, x0, x1, factor, par);
         refined.hits = swept_hits(model, around.filter, passing, candidates, segment.start, &refined.end, par);
-        account.detection += lap(&mut clock);
+        report.times.detection += lap(&mut clock);
         unrounded_end(segment, &refined, &mut linear_end);
         let end = &linear_end.positions;
         if !converged && refined.set.recovers() {
@@ -192,8 +181,8 @@ fn solve_round(
     tolerance_factor: f64,
     memory: &Memory,
     refined: &mut Refined,
-    scratch: &mut Scratch,
-    account: &mut RoundAccount,
+    solver: &mut SolverScratch,
+    step_report: &mut StepReport,
 ) -> bool {
     let mut clock = Instant::now();
     let (model, metric, unconstrained) = (segment.model, around.metric, &segment.drives.velocities);
@@ -206,7 +195,7 @@ fn solve_round(
     };
     let set = &mut refined.set;
     let built = build_rows(model, metric, &set.contacts, &set.required_gaps, &set.kept_tangents, &about);
-    account.rows += lap(&mut clock);
+    step_report.times.rows += lap(&mut clock);
     if built.rows.is_empty() {
         refined.velocities.clone_from(unconstrained);
         refined.block_impulses = vec![[0.0; 3]; model.block_count];
@@ -223,7 +212,7 @@ fn solve_round(
     let demanded = built.rows.normal_targets.iter().fold(0.0_f64, |a, c| a.max(*c));
     let velocity_scale = scale_of_motion.max(demanded);
     let settings = Settings {
-        iterations_max: iterations_left(around.settings.iterations_max, account.iterations),
+        iterations_max: iterations_left(around.settings.iterations_max, step_report.iterations),
         ..solve_tolerances(around.settings, set, segment.dt * velocity_scale, tolerance_factor)
     };
     let problem = ContactProblem {
@@ -233,14 +222,14 @@ fn solve_round(
         velocity_scale,
     };
     let report = if velocity_scale > 0.0 {
-        solve_balanced(&problem, metric, &built, &mut impulses, &mut dv, &settings, &mut scratch.solver, around.par)
+        solve_balanced(&problem, metric, &built, &mut impulses, &mut dv, &settings, solver, around.par)
     } else {
         // Nothing moves and no row asks for anything.
         impulses.fill([0.0; 3]);
         dv.fill([0.0; 3]);
         SolverReport { converged: true, ..SolverReport::default() }
     };
-    account.add(&report);
+    book(&report, step_report);
     set.keep(around.settings.friction_cone, &built, &impulses);
     refined.block_impulses = block_impulses(model.block_count, &built, &impulses);
     refined.built = built;
@@ -253,7 +242,7 @@ fn solve_round(
         };
         refined.velocities[block] = add(unconstrained[block], response);
     }
-    account.solve += lap(&mut clock);
+    step_report.times.solve += lap(&mut clock);
     report.converged
 }
 

@@ -1,10 +1,9 @@
-//! What the method remembers from step to step: warm starts by persistent key, and the last certified state.
+//! What the method remembers from step to step: warm starts by persistent key.
 
-use super::constraint_set::ConstraintSet;
-use crate::contact_search::{BodyFilter, Contact, ContactKey};
-use crate::dynamics::Accelerations;
+use crate::contact_search::{Contact, ContactKey};
 use crate::math::{Vec3, norm, scale};
-use crate::model::{HalfSpace, Model, State};
+use crate::model::Model;
+use crate::step::{Carried, SolvedContact};
 
 /// One contact of the last step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +16,7 @@ pub struct RememberedContact {
     pub tangent: Option<Vec3>,
 }
 
-/// Warm starts by persistent key, and the state that was certified last. Part of a snapshot.
+/// Warm starts by persistent key, and what every method carries. Part of a snapshot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Memory {
     /// Contacts with an impulse, sorted by key.
@@ -26,23 +25,8 @@ pub struct Memory {
     pub dt: f64,
     /// Velocities at the end of the last step, by body key.
     pub velocities: Vec<(u64, Vec<Vec3>)>,
-    /// What the unconstrained solves of the last step found: where the next ones start.
-    pub accelerations: Accelerations,
-    /// Topology and positions that were certified last.
-    pub certified: Option<Certified>,
-}
-
-/// A state known to be free of intersections.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Certified {
-    /// Which topology.
-    pub topology: u64,
-    /// Which filter, [`BodyFilter::fingerprint`].
-    pub filter: u64,
-    /// Positions of all vertices.
-    pub positions: Vec<Vec3>,
-    /// Half-spaces of all bodies.
-    pub half_spaces: Vec<HalfSpace>,
+    /// What every method carries.
+    pub carried: Carried,
 }
 
 impl Memory {
@@ -59,21 +43,11 @@ impl Memory {
         }
     }
 
-    /// Whether this very state was certified, for the same topology and filter.
-    pub fn knows(&self, model: &Model, filter: &BodyFilter, state: &State) -> bool {
-        self.certified.as_ref().is_some_and(|c| {
-            c.topology == model.topology_hash
-                && c.filter == filter.fingerprint()
-                && c.positions == state.positions
-                && c.half_spaces == state.half_spaces
-        })
-    }
-
     /// Remembers the contacts of a solved segment.
-    pub fn keep_contacts(&mut self, model: &Model, set: &ConstraintSet, dt: f64) {
+    pub fn keep_contacts(&mut self, model: &Model, contacts: &[SolvedContact], dt: f64) {
         self.dt = dt;
         self.contacts.clear();
-        for (contact, solved) in set.contacts.iter().zip(&set.solved) {
+        for SolvedContact { contact, solved, .. } in contacts {
             if norm(solved.impulse) > 0.0 {
                 self.contacts.push(RememberedContact {
                     key: contact.pair.key(model, contact.ordinal),
@@ -93,11 +67,17 @@ impl Memory {
         }
     }
 
+    /// What the first part of a step starts from.
+    pub fn warm(&self) -> Memory {
+        let (contacts, velocities) = (self.contacts.clone(), self.velocities.clone());
+        Memory { contacts, dt: self.dt, velocities, ..Memory::default() }
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.contacts.len() * std::mem::size_of::<RememberedContact>()
-            + self.velocities.iter().chain(&self.accelerations).map(|(_, v)| 24 * v.len() + 32).sum::<usize>()
-            + self.certified.as_ref().map_or(0, |c| 24 * c.positions.len() + 32 * c.half_spaces.len())
+            + self.velocities.iter().map(|(_, v)| 24 * v.len() + 32).sum::<usize>()
+            + self.carried.bytes()
     }
 }
 
@@ -105,7 +85,7 @@ impl Memory {
 mod tests {
     use super::*;
     use crate::contact_search::{Pair, PairKind, half_space_contact};
-    use crate::model::{BodyDescription, Kind, Material, Materials, Precision, Surface};
+    use crate::model::{BodyDescription, HalfSpace, Kind, Material, Materials, Precision, Surface};
     use std::sync::Arc;
 
     fn model() -> Model {
@@ -146,25 +126,5 @@ mod tests {
         assert_eq!(tangent, Some([1.0, 0.0, 0.0]), "the frame is kept while the contact sticks");
         let other = Contact { ordinal: 1, ..contact };
         assert_eq!(memory.warm_start(&model, &other, 0.0025), ([0.0; 3], None));
-    }
-
-    #[test]
-    fn only_the_very_state_is_known() {
-        let model = model();
-        let mut state = model.rest_state();
-        let filter = BodyFilter::new(&model);
-        let certified = Certified {
-            topology: model.topology_hash,
-            filter: filter.fingerprint(),
-            positions: state.positions.clone(),
-            half_spaces: state.half_spaces.clone(),
-        };
-        let memory = Memory { certified: Some(certified), ..Memory::default() };
-        assert!(memory.knows(&model, &filter, &state));
-        state.positions[0][2] = f64::MIN_POSITIVE;
-        assert!(!memory.knows(&model, &filter, &state));
-        state.positions[0][2] = 0.0;
-        state.half_spaces[1].offset = -1.0;
-        assert!(!memory.knows(&model, &filter, &state));
     }
 }

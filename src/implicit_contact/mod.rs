@@ -18,9 +18,7 @@
 //! * `velocity_error`: the estimate that decides when to stop
 //! * `constraint_set`: the contacts of a segment, which grow from round to round
 //! * `manifold_refinement`: rounds of solving and continuous detection
-//! * `fall_back`: the fail-safes of a segment in their order
-//! * `memory`: warm starts by key and the state certified last
-//! * `commit`: what the parts of a step add up to
+//! * `memory`: warm starts by key
 //! * `stop_test`: when a solver ends
 //! * `advance`: the step as a list of stages
 
@@ -28,12 +26,9 @@ mod accelerated_relaxation;
 mod advance;
 mod augmented_lagrangian;
 mod block_diagonal;
-mod commit;
 mod constraint_set;
 mod direct_newton;
 mod double_relaxation;
-mod driven;
-mod fall_back;
 mod friction;
 mod full_anticipation;
 mod incidence;
@@ -51,5 +46,5 @@ mod stop_test;
 mod velocity_error;
 
 pub use advance::{Scratch, advance, advance_watched};
-pub use memory::{Certified, Memory, RememberedContact};
+pub use memory::{Memory, RememberedContact};
 pub use problem::{ContactProblem, SolverReport, SolverScratch, solve};

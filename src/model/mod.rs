@@ -28,7 +28,9 @@ pub use dynamics::Dynamics;
 pub use material::{CombineRule, Material, Materials};
 pub use motion::Segment;
 pub use report::{BuildError, ContactRecord, StageTimes, StepError, StepReport, Witness};
-pub use settings::{Ablation, FailSafe, FrictionCone, Settings, SolverChoice, StartPolicy, ZoneFriction};
+pub use settings::{
+    Ablation, FailSafe, FilterSettings, FrictionCone, Method, Settings, SolverChoice, StartPolicy, ZoneFriction,
+};
 pub use state::{Drives, HalfSpace, State, StepResult};
 pub use system::{System, SystemDescription};
 pub use watch::{Phase, Told, Watch};

@@ -79,9 +79,9 @@ pub struct StepReport {
     pub contacts: u32,
     /// Contacts with an impulse.
     pub active_contacts: u32,
-    /// Rounds of constraint manifold refinement, summed over the parts of the step.
+    /// Rounds of constraint manifold refinement, or passes of the velocity filter, summed over the parts of the step.
     pub rounds: u32,
-    /// Outer solver iterations, summed.
+    /// Outer solver iterations, or impulses of the velocity filter, summed.
     pub iterations: u32,
     /// Parts that the step was divided into; 1 when it was not.
     pub parts: u32,
@@ -101,7 +101,7 @@ pub struct StepReport {
     pub friction_residual: f64,
     /// Dynamics residual `|A dv - J^T lambda| / |J^T lambda|`; worst of the step.
     pub dynamics_residual: f64,
-    /// Work done by thickness recovery `[J]`.
+    /// Work done by thickness recovery, by springs of the velocity filter at most `[J]`.
     pub recovery_work: f64,
     /// Momentum taken by held zones and infinite masses `[N s]`.
     pub momentum_taken: Vec3,

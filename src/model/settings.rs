@@ -1,5 +1,15 @@
 //! Tolerances and work caps of a step. All relative or counters: never wall-clock, never absolute lengths.
 
+/// Contact method of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Implicit contact: constraint manifold refinement around iterative constraint anticipation [Otaduy09].
+    #[default]
+    ImplicitContact,
+    /// Velocity filter: repulsions, impulses, zones [Harmon10, ch. 3].
+    VelocityFilter,
+}
+
 /// Which solver runs the constrained dynamics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SolverChoice {
@@ -85,9 +95,32 @@ impl Default for Ablation {
     }
 }
 
+/// What only [`Method::VelocityFilter`] reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilterSettings {
+    /// Coefficient of restitution of impulses, 0 to 1: the share of its normal velocity with which a collision parts.
+    pub restitution: f64,
+    /// Stiffness k of the springs between what is closer than its thickness, at least 0, in units of the contact's
+    /// effective mass over `dt^2`: 1 makes up for the whole overlap within a step, before the cap on the separation that it
+    /// causes (`recovery_fraction`). 0: no springs.
+    pub repulsion_stiffness: f64,
+    /// Passes of impulses and continuous detection before the fail-safes.
+    pub passes_max: u32,
+}
+
+impl Default for FilterSettings {
+    fn default() -> Self {
+        FilterSettings { restitution: 0.0, repulsion_stiffness: 1.0, passes_max: 10 }
+    }
+}
+
 /// Settings of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
+    /// Contact method that [`crate::world::World::step`] runs.
+    pub method: Method,
+    /// What the velocity filter reads.
+    pub filter: FilterSettings,
     /// Solver of the constrained dynamics.
     pub solver: SolverChoice,
     /// Shape of the friction limit.
@@ -127,6 +160,8 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Settings {
+            method: Method::default(),
+            filter: FilterSettings::default(),
             solver: SolverChoice::default(),
             friction_cone: FrictionCone::default(),
             start_policy: StartPolicy::default(),

@@ -10,7 +10,7 @@ use super::statistics::{StepRow, processor_seconds};
 use super::subdivide::subdivided;
 use super::usd::UsdCache;
 use crate::math::dot;
-use crate::model::StepReport;
+use crate::model::{Method, Settings, StepReport};
 use crate::parallel::{Par, Pool};
 use crate::world::{Fault, World};
 use std::io::{self, Write};
@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 pub struct Options {
     /// Scene file.
     pub scene: PathBuf,
-    /// Contact method; only `implicit` so far.
+    /// Contact method: `implicit` or `filter`.
     pub method: String,
     /// Step to stop at; `None`: the end of the scene.
     pub steps: Option<u64>,
@@ -81,9 +81,7 @@ pub struct Finished {
 ///
 /// Errors: the scene, the options, files, a step that was refused. A pinched step is counted and the run goes on.
 pub fn run(options: &Options, watch: &mut dyn FnMut(u64, u64) -> bool) -> Result<Finished, Failure> {
-    if options.method != "implicit" {
-        return Err(Failure::Usage(format!("there is no method '{}': implicit", options.method)));
-    }
+    let method = method(options)?;
     let name = options.scene.display().to_string();
     let text = std::fs::read_to_string(&options.scene).map_err(|e| Failure::Io(format!("{name}: {e}")))?;
     let file = SceneFile::parse(&name, &text).map_err(Failure::Scene)?;
@@ -96,7 +94,8 @@ pub fn run(options: &Options, watch: &mut dyn FnMut(u64, u64) -> bool) -> Result
         threads => Some(Pool::new(threads).map_err(Failure::Usage)?),
     };
     let key = run_key(&text, options);
-    let mut run = Run::new(&file, scene, options, key)?;
+    let settings = file.settings.settings(method);
+    let mut run = Run::new(&file, scene, options, settings, key)?;
     let last = options.steps.unwrap_or(file.steps());
     let par = pool.as_ref().map_or(Par::Serial, Par::Pool);
     run.frame(false, par)?;
@@ -109,6 +108,15 @@ pub fn run(options: &Options, watch: &mut dyn FnMut(u64, u64) -> bool) -> Result
     run.finish(interrupted, last)
 }
 
+/// The contact method by its name.
+fn method(options: &Options) -> Result<Method, Failure> {
+    match options.method.as_str() {
+        "implicit" => Ok(Method::ImplicitContact),
+        "filter" => Ok(Method::VelocityFilter),
+        other => Err(Failure::Usage(format!("there is no method '{other}': implicit, filter"))),
+    }
+}
+
 /// What a snapshot must agree with: the scene, its method and its jitter.
 fn run_key(text: &str, options: &Options) -> u64 {
     // FNV-1a; not for adversaries.
@@ -118,6 +126,7 @@ fn run_key(text: &str, options: &Options) -> u64 {
 
 struct Run<'a> {
     file: &'a SceneFile,
+    settings: Settings,
     scene: Scene,
     options: &'a Options,
     key: u64,
@@ -129,10 +138,17 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(file: &'a SceneFile, scene: Scene, options: &'a Options, key: u64) -> Result<Run<'a>, Failure> {
+    fn new(
+        file: &'a SceneFile,
+        scene: Scene,
+        options: &'a Options,
+        settings: Settings,
+        key: u64,
+    ) -> Result<Run<'a>, Failure> {
         let per_frame = (1.0 / (file.dt * file.output.frames_per_second)).round().max(1.0);
         let mut run = Run {
             file,
+            settings,
             scene,
             options,
             key,
@@ -192,7 +208,7 @@ impl<'a> Run<'a> {
         let failed = |message: String| Failure::Step(number, message);
         self.scene.push_targets(time).map_err(|e| failed(e.message))?;
         let (clock, processor) = (std::time::Instant::now(), processor_seconds());
-        let outcome = self.scene.world.step(&self.file.settings.settings(), self.file.dt, par);
+        let outcome = self.scene.world.step(&self.settings, self.file.dt, par);
         let seconds = clock.elapsed().as_secs_f64();
         let used = processor.and_then(|before| processor_seconds().map(|after| after - before));
         let report: StepReport = match outcome {
@@ -240,7 +256,7 @@ impl<'a> Run<'a> {
         }
         let finer = out.join("subdivided").join(format!("frame_{:06}.obj", self.step));
         if self.options.subdivide > 0 && (due || last) && !finer.exists() {
-            let settings = self.file.settings.settings();
+            let settings = self.file.settings.settings(Method::ImplicitContact);
             let surfaces = subdivided(&self.scene, self.options.subdivide, &settings, par)
                 .map_err(|message| Failure::Step(self.step, message))?;
             write_obj(&surfaces, &finer).map_err(io)?;

@@ -2,7 +2,7 @@
 
 use super::fault::FieldFault;
 use super::file::{not_negative, positive};
-use crate::model::{FailSafe, FrictionCone, Settings, SolverChoice, StartPolicy, ZoneFriction};
+use crate::model::{FailSafe, FilterSettings, FrictionCone, Method, Settings, SolverChoice, StartPolicy, ZoneFriction};
 use serde::Deserialize;
 
 /// Settings of the step; what is not given keeps its default.
@@ -23,6 +23,9 @@ pub struct SettingsTable {
     pub turn_max: Option<f64>,
     pub fail_safe: Option<FailSafeName>,
     pub zone_friction: Option<ZoneFrictionName>,
+    pub restitution: Option<f64>,
+    pub repulsion_stiffness: Option<f64>,
+    pub passes_max: Option<u32>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -67,8 +70,8 @@ pub enum Start {
 }
 
 impl SettingsTable {
-    /// The settings, with every step certified.
-    pub fn settings(&self) -> Settings {
+    /// The settings of a method, with every step certified.
+    pub fn settings(&self, method: Method) -> Settings {
         let d = Settings::default();
         let solver = self.solver.map_or(d.solver, |solver| match solver {
             Solver::Automatic => SolverChoice::Automatic,
@@ -96,7 +99,14 @@ impl SettingsTable {
             ZoneFrictionName::PerZone => ZoneFriction::PerZone,
             ZoneFrictionName::Frictionless => ZoneFriction::Frictionless,
         });
+        let filter = FilterSettings {
+            restitution: self.restitution.unwrap_or(d.filter.restitution),
+            repulsion_stiffness: self.repulsion_stiffness.unwrap_or(d.filter.repulsion_stiffness),
+            passes_max: self.passes_max.unwrap_or(d.filter.passes_max),
+        };
         Settings {
+            method,
+            filter,
             solver,
             friction_cone,
             start_policy,
@@ -128,7 +138,14 @@ impl SettingsTable {
         ] {
             value.map_or(Ok(()), |value| positive(value, at, name))?;
         }
-        self.recovery_fraction.map_or(Ok(()), |value| not_negative(value, at, "recovery_fraction"))?;
+        for (value, name) in
+            [(self.recovery_fraction, "recovery_fraction"), (self.repulsion_stiffness, "repulsion_stiffness")]
+        {
+            value.map_or(Ok(()), |value| not_negative(value, at, name))?;
+        }
+        if let Some(restitution) = self.restitution.filter(|e| !(0.0..=1.0).contains(e)) {
+            return Err(FieldFault::new("settings.restitution", format!("between 0 and 1, not {restitution}")));
+        }
         match self.proximity_factor {
             Some(factor) if !(factor >= 1.0 && factor.is_finite()) => {
                 Err(FieldFault::new("settings.proximity_factor", format!("finite and at least 1, not {factor}")))

@@ -39,6 +39,7 @@ pub use system::SymmetrySlack;
 use crate::implicit_contact::{Memory, Scratch};
 use crate::math::Vec3;
 use crate::model::{ContactRecord, Drives, Material, Model, State, StepResult, Witness};
+use crate::velocity_filter;
 use ids::{IdKind, Slots};
 
 /// Bodies, materials, systems and filters of a host, and what the method remembers.
@@ -57,6 +58,7 @@ pub struct World {
     result: StepResult,
     memory: Memory,
     scratch: Scratch,
+    filter_scratch: velocity_filter::Scratch,
     contacts: Vec<ContactRecord>,
     witnesses: Vec<Witness>,
 }
@@ -85,6 +87,7 @@ impl World {
             result: StepResult::default(),
             memory: Memory::default(),
             scratch: Scratch::default(),
+            filter_scratch: velocity_filter::Scratch::default(),
             contacts: Vec::new(),
             witnesses: Vec::new(),
         }

@@ -21,6 +21,7 @@ use crate::model::{
     BodyDescription, CombineRule, ContactRecord, Dynamics, HalfSpace, Kind, Material, Model, Precision, State,
     StepResult,
 };
+use crate::step::Carried;
 use std::sync::Arc;
 
 /// Version of the format that is written, and the only one that is read.
@@ -136,12 +137,13 @@ impl Archive for Memory {
         self.contacts.save(out);
         self.dt.save(out);
         self.velocities.save(out);
-        self.accelerations.save(out);
+        self.carried.accelerations.save(out);
     }
 
     fn load(source: &mut Source) -> Result<Self, WorldError> {
         let (contacts, dt, velocities) = Archive::load(source)?;
-        Ok(Memory { contacts, dt, velocities, accelerations: Archive::load(source)?, certified: None })
+        let carried = Carried { accelerations: Archive::load(source)?, certified: None };
+        Ok(Memory { contacts, dt, velocities, carried })
     }
 }
 
@@ -237,6 +239,7 @@ impl World {
             result: StepResult::default(),
             memory,
             scratch: Scratch::default(),
+            filter_scratch: Default::default(),
             contacts,
             witnesses: Vec::new(),
         })
@@ -306,7 +309,7 @@ impl World {
         if !(sorted && finite && memory.dt.is_finite() && memory.dt >= 0.0) {
             return Err(damaged("the remembered contacts are out of order, or not finite").value(memory.dt));
         }
-        for (index, (body, velocities)) in memory.velocities.iter().chain(&memory.accelerations).enumerate() {
+        for (index, (body, velocities)) in memory.velocities.iter().chain(&memory.carried.accelerations).enumerate() {
             // A body may have been removed since the step; one that is there has all its blocks.
             let fits = self.bodies.get(self.bodies.id_of_key(*body)).map_or(true, |b| b.blocks() == velocities.len());
             if !fits || !velocities.iter().all(|v| is_finite(*v)) {

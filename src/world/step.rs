@@ -3,10 +3,11 @@
 use super::body::Body;
 use super::{Fault, World, WorldError};
 use crate::contact_search::{BodyFilter, intersections, swept_free};
-use crate::implicit_contact::advance_watched;
+use crate::implicit_contact;
 use crate::math::ZERO;
-use crate::model::{BodyDescription, BuildError, Model, Settings, State, StepError, StepReport, System, Watch};
+use crate::model::{BodyDescription, BuildError, Method, Model, Settings, State, StepError, StepReport, System, Watch};
 use crate::parallel::Par;
+use crate::velocity_filter;
 
 /// A step that failed. When pinched, the world stands at the certified fraction and the report says how far.
 #[derive(Clone, Debug)]
@@ -50,17 +51,17 @@ impl World {
         self.gather()?;
         self.witnesses.clear();
         self.check_pushed_starts(par)?;
-        let outcome = advance_watched(
-            &self.model,
-            &mut self.state,
-            &self.drives,
-            &mut self.memory,
-            settings,
-            dt,
-            &mut self.result,
-            &mut self.scratch,
-            (par, watch),
-        );
+        let World { model, state, drives, memory, result, scratch, filter_scratch, .. } = self;
+        let run = (par, watch);
+        let outcome = match settings.method {
+            Method::ImplicitContact => {
+                implicit_contact::advance_watched(model, state, drives, memory, settings, dt, result, scratch, run)
+            }
+            Method::VelocityFilter => {
+                let (memory, scratch) = (&mut memory.carried, filter_scratch);
+                velocity_filter::advance_watched(model, state, drives, memory, settings, dt, result, scratch, run)
+            }
+        };
         match outcome {
             Ok(report) => {
                 self.scatter();

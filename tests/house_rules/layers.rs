@@ -11,6 +11,7 @@ const LAYERS: &[&[&str]] = &[
     &["dynamics", "contact_search"],
     &["constraint"],
     &["fail_safe"],
+    &["step"],
     &["implicit_contact", "velocity_filter", "asynchronous_contact"],
     &["world"],
     &["scene", "capi"],

@@ -12,6 +12,8 @@ mod coupling;
 mod division;
 mod energy;
 mod fail_safes;
+mod filter;
+mod filter_examples;
 mod friction;
 mod inputs;
 mod momentum;

@@ -3,7 +3,7 @@
 use crate::world::*;
 use signorini::contact_search::{
     BodyFilter, CandidateSearch, Contact, Pair, PairKind, Passing, gather, minimum_separation, near_contacts,
-    swept_free, swept_hits,
+    renewed_hits, swept_free, swept_hits,
 };
 use signorini::math::{Vec3, add, lerp, norm, sub};
 use signorini::model::{Model, State};
@@ -206,4 +206,41 @@ fn what_comes_too_close_at_a_sampled_time_is_hit_and_hits_are_close() {
         assert_eq!(hits.len() - mesh.len(), model.contact_vertices.iter().filter(by_plane).count());
     }
     assert!(total > 100);
+}
+
+/// What moved is tested again, the rest is remembered: the same hits as a test of everything.
+#[test]
+fn hits_are_renewed_as_if_all_were_tested() {
+    let (mut renewed_any, mut kept_any, mut gone_any) = (0, 0, 0);
+    for seed in 1..6 {
+        let (world, end) = scene(seed);
+        let (model, filter) = (&world.model, BodyFilter::new(&world.model));
+        let mut jitter = Jitter(seed + 77);
+        let mut search = CandidateSearch::default();
+        let test = |end: &State, search: &mut CandidateSearch| {
+            let x = (&world.state.positions, &end.positions);
+            let candidates = search.update(model, &filter, x.0, x.1, 2.0, Par::Serial);
+            swept_hits(model, &filter, &Passing::default(), candidates, &world.state, end, Par::Serial)
+        };
+        let mut before = (end.clone(), test(&end, &mut search));
+        for _ in 0..5 {
+            let mut next = before.0.clone();
+            for x in next.positions.iter_mut() {
+                if jitter.next() > 0.7 {
+                    *x = add(*x, jitter.vector(0.02));
+                }
+            }
+            let all = test(&next, &mut search);
+            let moved: Vec<bool> = next.positions.iter().zip(&before.0.positions).map(|(a, b)| a != b).collect();
+            let candidates = search.update(model, &filter, &world.state.positions, &next.positions, 2.0, Par::Serial);
+            let (passing, ends) = (Passing::default(), (&world.state, &next));
+            let renewed = renewed_hits(model, &filter, &passing, candidates, ends, &before.1, &moved, Par::Serial);
+            assert_eq!(renewed, all, "seed {seed}");
+            kept_any += all.iter().filter(|hit| before.1.contains(hit)).count();
+            renewed_any += all.iter().filter(|hit| !before.1.contains(hit)).count();
+            gone_any += before.1.iter().filter(|hit| !all.contains(hit)).count();
+            before = (next, all);
+        }
+    }
+    assert!(renewed_any > 0 && kept_any > 0 && gone_any > 0, "{renewed_any} {kept_any} {gone_any}");
 }

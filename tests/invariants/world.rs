@@ -6,6 +6,7 @@ use signorini::kinematics::Pose;
 use signorini::math::{Mat3, Vec3, add, add_scaled, mat_vec};
 use signorini::model::*;
 use signorini::parallel::Par;
+use signorini::velocity_filter;
 use std::sync::Arc;
 
 pub const HALF_THICKNESS: f64 = 1e-3;
@@ -144,6 +145,7 @@ impl Plan {
             velocities,
             memory: Memory::default(),
             scratch: Scratch::default(),
+            filter_scratch: velocity_filter::Scratch::default(),
             result: StepResult::default(),
             settings: Settings { certify: true, ..Settings::default() },
             gravity: [0.0; 3],
@@ -160,6 +162,7 @@ pub struct World {
     pub drives: Drives,
     pub memory: Memory,
     pub scratch: Scratch,
+    pub filter_scratch: velocity_filter::Scratch,
     pub result: StepResult,
     pub settings: Settings,
     pub gravity: Vec3,
@@ -190,17 +193,14 @@ impl World {
 
     /// One step with the drives as they are.
     pub fn advance(&mut self, par: Par) -> Result<StepReport, StepError> {
-        let report = advance(
-            &self.model,
-            &mut self.state,
-            &self.drives,
-            &mut self.memory,
-            &self.settings,
-            self.dt,
-            &mut self.result,
-            &mut self.scratch,
-            par,
-        );
+        let World { model, state, drives, memory, settings, dt, result, scratch, filter_scratch, .. } = self;
+        let report = match settings.method {
+            Method::ImplicitContact => advance(model, state, drives, memory, settings, *dt, result, scratch, par),
+            Method::VelocityFilter => {
+                let (memory, scratch) = (&mut memory.carried, filter_scratch);
+                velocity_filter::advance(model, state, drives, memory, settings, *dt, result, scratch, par)
+            }
+        };
         self.velocities.clone_from(&self.result.end_velocities);
         report
     }

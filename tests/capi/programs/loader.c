@@ -30,7 +30,7 @@ int main(int count, char **arguments) {
     if (memcmp((char *)&api + place, (char *)&none + place, sizeof(void *)) == 0) return printf("place %d is empty\n", (int)place), 5;
   }
   if (api.version_init(&version, sizeof version) || api.version(&version) || version.abi != SGN_ABI_VERSION) return 6;
-  if (api.query(SGN_CAPABILITY_METHODS, &methods) || methods != 1 || api.query(999, &methods) != SGN_ERROR_UNSUPPORTED) return 7;
+  if (api.query(SGN_CAPABILITY_METHODS, &methods) || methods != 3 || api.query(999, &methods) != SGN_ERROR_UNSUPPORTED) return 7;
   if (api.context_create(SGN_ABI_VERSION, NULL, NULL, 0, &context) || api.world_create(context, NULL, &world)) return 8;
   if (api.world_state_hash(world, &hash) || hash == 0) return 9;
   if (api.world_destroy(world) || api.context_destroy(context)) return 10;

@@ -407,6 +407,9 @@ static void wrong_values(void) {
   WRONG_STEP(flags, (uint64_t)1 << 40, SGN_ERROR_INVALID_ARGUMENT);
   WRONG_STEP(contact_tolerance, -1, SGN_ERROR_INVALID_ARGUMENT);
   WRONG_STEP(iterations_max, 0, SGN_ERROR_INVALID_ARGUMENT);
+  WRONG_STEP(restitution, 1.01, SGN_ERROR_INVALID_ARGUMENT);
+  WRONG_STEP(repulsion_stiffness, -1, SGN_ERROR_INVALID_ARGUMENT);
+  WRONG_STEP(reserved, 1, SGN_ERROR_INVALID_ARGUMENT);
   WRONG_STEP(halvings_max, 21, SGN_ERROR_INVALID_ARGUMENT);
   OK(sgn_context_desc_init(&context_desc, sizeof context_desc));
   context_desc.executor = SGN_EXECUTOR_HOST;

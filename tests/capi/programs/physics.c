@@ -273,6 +273,43 @@ static void pinched(void) {
   close_scene(&s);
 }
 
+/* The velocity filter: a falling cloth leaves the ground with the restitution's share of its speed, and comes to rest
+ * without any. */
+static void filtered(double restitution) {
+  Scene s;
+  double x[VERTICES][3], lowest = 1, fastest = 0, share;
+  SgnView push = sgn_view(SGN_FORMAT_F64X3, s.host.v, VERTICES);
+  SgnViewMut pull = sgn_view_mut(SGN_FORMAT_F64X3, s.host.v, VERTICES), positions = sgn_view_mut(SGN_FORMAT_F64X3, x, VERTICES);
+  SgnStepReport report;
+  open_scene(&s, SGN_PRECISION_F64, 0);
+  s.step.method = SGN_METHOD_VELOCITY_FILTER;
+  s.step.restitution = restitution;
+  OK(sgn_step_report_init(&report, sizeof report));
+  for (int i = 0; i < VERTICES; i++) s.host.v[i][2] = -8;
+  OK(sgn_body_push(s.world, s.cloth, SGN_SLOT_VELOCITY, &push, 0));
+  CHECK(sgn_world_step(s.world, &s.step, &report) == SGN_OK);
+  CHECK(report.rounds == 2 && report.iterations == VERTICES && report.certified == 1 && report.intersections == 0);
+  OK(sgn_body_pull(s.world, s.cloth, SGN_SLOT_END_VELOCITY, &pull));
+  for (int i = 0; i < VERTICES; i++) {
+    share = s.host.v[i][2] / 8;
+    CHECK(fabs(share - restitution) < 1e-12);
+  }
+  s.step.restitution = 0;
+  for (int frame = 0; frame < 200; frame++) {
+    for (int i = 0; i < VERTICES; i++) s.host.v[i][2] -= G * DT;
+    OK(sgn_body_push(s.world, s.cloth, SGN_SLOT_VELOCITY, &push, 0));
+    CHECK(sgn_world_step(s.world, &s.step, &report) == SGN_OK);
+    OK(sgn_body_pull(s.world, s.cloth, SGN_SLOT_END_VELOCITY, &pull));
+  }
+  OK(sgn_body_pull(s.world, s.cloth, SGN_SLOT_POSITION, &positions));
+  for (int i = 0; i < VERTICES; i++) {
+    lowest = x[i][2] < lowest ? x[i][2] : lowest;
+    fastest = fabs(s.host.v[i][2]) > fastest ? fabs(s.host.v[i][2]) : fastest;
+  }
+  CHECK(lowest > 0 && lowest < 0.01 && fastest < 0.2);
+  close_scene(&s);
+}
+
 /* Warm starts and results survive a rebuild: a body far away comes and goes, the others do not notice. */
 static void rebuilds_change_nothing(void) {
   uint64_t hashes[2];
@@ -350,6 +387,8 @@ int main(void) {
   floats_are_certified();
   pushes_between_steps();
   pinched();
+  filtered(0);
+  filtered(0.75);
   rebuilds_change_nothing();
   return finish();
 }

@@ -1,12 +1,22 @@
 //! Accounts of a step: what its parts add up to, and the result that the host pulls.
 
-use super::manifold_refinement::{Refined, RoundAccount, Surroundings};
+use super::part::{PartEnd, SolvedContact};
+use crate::constraint::Metric;
 use crate::contact_search::{Contact, PairKind};
 use crate::math::{Vec3, add_scaled, cross, dot, norm, scale, sub};
 use crate::model::{Body, ContactRecord, Drives, Kind, Model, State, StepReport, StepResult};
+use std::time::Instant;
+
+/// Microseconds since `from`, which is set to now.
+pub fn lap(from: &mut Instant) -> f64 {
+    let now = Instant::now();
+    let microseconds = now.duration_since(*from).as_secs_f64() * 1e6;
+    *from = now;
+    microseconds
+}
 
 /// Sums over the parts of a step.
-pub(super) struct StepAccount {
+pub struct StepAccount {
     /// State reached.
     pub state: State,
     /// Mean impulse per block so far, weighted by duration `[N s]`.
@@ -14,57 +24,54 @@ pub(super) struct StepAccount {
     /// Velocities of the last part.
     pub end_velocities: Vec<Vec3>,
     /// The last part.
-    pub last: Refined,
+    pub last: PartEnd,
     /// Duration of the last part `[s]`.
     pub last_dt: f64,
-    /// Rounds and residuals.
-    pub rounds: RoundAccount,
-    /// Everything else that is reported.
+    /// What is reported.
     pub report: StepReport,
 }
 
 impl StepAccount {
-    pub fn new(model: &Model, state: &State, drives: &Drives) -> StepAccount {
+    /// No part done yet, from `state`, with what was reported before the first.
+    pub fn new(model: &Model, state: &State, drives: &Drives, report: StepReport) -> StepAccount {
         StepAccount {
             state: state.clone(),
             impulses: vec![[0.0; 3]; model.block_count],
             end_velocities: drives.velocities.clone(),
-            last: Refined::default(),
+            last: PartEnd::default(),
             last_dt: 0.0,
-            rounds: RoundAccount::default(),
-            report: StepReport { certified_fraction: 1.0, ..StepReport::default() },
+            report: StepReport { certified_fraction: 1.0, ..report },
         }
     }
 
     /// Takes over a clean part that lasts `share` of the step.
-    pub fn add_part(&mut self, model: &Model, around: &Surroundings, refined: Refined, share: f64, dt: f64) {
+    pub fn add_part(&mut self, model: &Model, metric: &Metric, part: PartEnd, share: f64, dt: f64) {
         // A HOST body's parts are shares of one path, those of a MODEL body are steps of their own.
         let weight = |body: &Body| if body.description.dynamics.is_some() { 1.0 } else { share };
         for body in &model.bodies {
             for block in body.blocks.clone() {
-                self.impulses[block] = add_scaled(self.impulses[block], weight(body), refined.block_impulses[block]);
+                self.impulses[block] = add_scaled(self.impulses[block], weight(body), part.block_impulses[block]);
             }
         }
         let report = &mut self.report;
         report.parts += 1;
         let mut angular_error = [0.0; 3];
-        for (row, index) in refined.built.contact.iter().enumerate() {
-            let contact = &refined.set.contacts[*index as usize];
-            let f = refined.set.solved[*index as usize].impulse;
+        for SolvedContact { contact, required_gap, solved, .. } in part.contacts.iter().filter(|c| c.is_row) {
+            let f = solved.impulse;
             let share = contact.pair.bodies(model).into_iter().map(|b| weight(&model.bodies[b])).fold(share, f64::max);
-            let on_fixed = fixed_share(model, around, contact);
+            let on_fixed = fixed_share(model, metric, contact);
             report.momentum_taken = add_scaled(report.momentum_taken, share * on_fixed, f);
-            let regained = (refined.set.required_gaps[*index as usize] - contact.start_gap).max(0.0);
-            report.recovery_work += share * dot(refined.built.rows.frames[row][0], f) * regained / dt;
+            let regained = (required_gap - contact.start_gap).max(0.0);
+            report.recovery_work += share * dot(contact.normal, f) * regained / dt;
             if contact.pair.kind != PairKind::VertexHalfSpace && on_fixed == 0.0 {
                 let arm = start_separation(contact, &self.state.positions);
                 angular_error = add_scaled(angular_error, share, cross(arm, f));
             }
         }
         report.angular_momentum_error += norm(angular_error);
-        self.state.clone_from(&refined.end);
-        self.end_velocities.clone_from(&refined.velocities);
-        self.last = refined;
+        self.state.clone_from(&part.end);
+        self.end_velocities.clone_from(&part.velocities);
+        self.last = part;
         self.last_dt = dt;
     }
 
@@ -76,21 +83,11 @@ impl StepAccount {
         self.report.momentum_taken = add_scaled(self.report.momentum_taken, share, momentum_taken);
     }
 
-    /// The report, counts and residuals filled in.
+    /// The report, contacts counted.
     pub fn finished_report(&mut self) -> StepReport {
-        let (report, rounds) = (&mut self.report, &self.rounds);
-        report.contacts = self.last.built.contact.len() as u32;
-        report.active_contacts = self.last.set.solved.iter().filter(|s| norm(s.impulse) > 0.0).count() as u32;
-        report.rounds = rounds.rounds;
-        report.iterations = rounds.iterations;
-        report.not_converged = rounds.not_converged;
-        report.complementarity_residual = rounds.complementarity;
-        report.friction_residual = rounds.friction;
-        report.dynamics_residual = rounds.dynamics;
-        report.times.search = rounds.search;
-        report.times.rows = rounds.rows;
-        report.times.solve = rounds.solve;
-        report.times.detection = rounds.detection;
+        let (report, contacts) = (&mut self.report, &self.last.contacts);
+        report.contacts = contacts.iter().filter(|c| c.is_row).count() as u32;
+        report.active_contacts = contacts.iter().filter(|c| norm(c.solved.impulse) > 0.0).count() as u32;
         report.clone()
     }
 
@@ -114,12 +111,12 @@ impl StepAccount {
 
 /// Share of a contact's impulse that its second and first primitive pass on to infinite masses, signed as on the
 /// first: `- sum of the weights that rows feel`.
-fn fixed_share(model: &Model, around: &Surroundings, contact: &Contact) -> f64 {
+fn fixed_share(model: &Model, metric: &Metric, contact: &Contact) -> f64 {
     let mut felt = 0.0;
     for k in 0..4 {
         let vertex = contact.vertices[k] as usize;
         let body = &model.bodies[model.vertex_body[vertex] as usize];
-        let fixed = &around.metric.fixed;
+        let fixed = &metric.fixed;
         felt += contact.weights[k]
             * match body.description.kind {
                 Kind::Deformable { .. } => body.carriers(vertex).filter(|(b, _)| !fixed[*b]).map(|(_, w)| w).sum(),
@@ -156,8 +153,8 @@ fn mean_velocities(model: &Model, start: &State, end: &State, dt: f64) -> Vec<Ve
     velocities
 }
 
-fn contact_records(model: &Model, last: &Refined, end: &State) -> Vec<ContactRecord> {
-    let record = |(contact, solved): (&Contact, &super::constraint_set::Solved)| ContactRecord {
+fn contact_records(model: &Model, last: &PartEnd, end: &State) -> Vec<ContactRecord> {
+    let record = |SolvedContact { contact, solved, .. }: &SolvedContact| ContactRecord {
         bodies: contact.pair.bodies(model).map(|b| model.bodies[b].description.key),
         kind: contact.pair.kind as u32,
         features: contact.pair.local_features(model),
@@ -173,5 +170,5 @@ fn contact_records(model: &Model, last: &Refined, end: &State) -> Vec<ContactRec
         },
         key: contact.pair.key(model, contact.ordinal).number(),
     };
-    last.set.contacts.iter().zip(&last.set.solved).map(record).collect()
+    last.contacts.iter().map(record).collect()
 }

@@ -1,8 +1,8 @@
-//! The fail-safes of a segment that rounds of refinement left with collisions, in their order.
+//! The fail-safes of a part that a method left with collisions, in their order.
 
-use super::Scratch;
-use super::manifold_refinement::{Refined, Surroundings};
-use crate::contact_search::{Hit, Passing};
+use super::part::PartEnd;
+use super::parts::Surroundings;
+use crate::contact_search::{CandidateSearch, Hit, Passing};
 use crate::fail_safe::{Nodes, Sweep, ZoneResponse, certified_share, hold, resolve_zones};
 use crate::math::{Vec3, add, mat_vec, sub};
 use crate::model::{Body, Kind, Model, Segment, State, Witness};
@@ -11,8 +11,8 @@ use crate::model::{Body, Kind, Model, Segment, State, Witness};
 pub(super) enum FallBack {
     /// The segment is clean with these velocities and this end.
     Resolved {
-        /// The refined segment with velocities, impulses and end replaced.
-        refined: Box<Refined>,
+        /// The part with velocities, impulses and end replaced.
+        part: Box<PartEnd>,
         /// Zones whose velocities were projected.
         projected: u32,
         /// Zones that moved as rigid bodies.
@@ -38,8 +38,8 @@ pub(super) fn fall_back(
     around: &Surroundings,
     segment: &Segment,
     passing: &Passing,
-    refined: Refined,
-    scratch: &mut Scratch,
+    part: PartEnd,
+    candidates: &mut CandidateSearch,
 ) -> FallBack {
     let sweep = Sweep {
         segment: *segment,
@@ -48,31 +48,25 @@ pub(super) fn fall_back(
         factor: around.settings.proximity_factor.max(1.0),
         par: around.par,
     };
-    let (metric, candidates) = (around.metric, &mut scratch.candidates);
-    let response = ZoneResponse { fail_safe: around.settings.fail_safe, friction: around.settings.zone_friction };
-    let zones = resolve_zones(&sweep, metric, &refined.velocities, &refined.hits, candidates, &response);
+    let (metric, settings) = (around.metric, around.settings);
+    let response = ZoneResponse { fail_safe: settings.fail_safe, friction: settings.zone_friction };
+    let zones = resolve_zones(&sweep, metric, &part.velocities, &part.hits, candidates, &response);
     let (projected, rigid) = (zones.projected, zones.rigid);
     if zones.hits.is_empty() {
-        let momentum_taken = momentum_lost(segment.model, around, &refined.velocities, &zones.velocities);
-        let refined = Box::new(replaced(around, refined, zones.velocities, zones.end));
-        return FallBack::Resolved { refined, projected, rigid, held_vertices: 0, momentum_taken };
+        let momentum_taken = momentum_lost(segment.model, around, &part.velocities, &zones.velocities);
+        let part = Box::new(replaced(around, part, zones.velocities, zones.end));
+        return FallBack::Resolved { part, projected, rigid, held_vertices: 0, momentum_taken };
     }
-    let holding = hold(&sweep, metric, &refined.velocities, &refined.hits, candidates);
+    let holding = hold(&sweep, metric, &part.velocities, &part.hits, candidates);
     if holding.hits.is_empty() {
         let nodes = Nodes::new(segment.model, metric);
-        let momentum_taken = momentum_lost(segment.model, around, &refined.velocities, &holding.velocities);
+        let momentum_taken = momentum_lost(segment.model, around, &part.velocities, &holding.velocities);
         let mut held_vertices = 0;
         for node in &holding.held {
             held_vertices += nodes.body(*node).map_or(1, |body| segment.model.bodies[body].vertices.len() as u32);
         }
-        let refined = replaced(around, refined, holding.velocities, holding.end);
-        return FallBack::Resolved {
-            refined: Box::new(refined),
-            projected: 0,
-            rigid: 0,
-            held_vertices,
-            momentum_taken,
-        };
+        let part = Box::new(replaced(around, part, holding.velocities, holding.end));
+        return FallBack::Resolved { part, projected: 0, rigid: 0, held_vertices, momentum_taken };
     }
     let (share, state) = certified_share(&sweep, &holding.velocities, &holding.hits, candidates);
     FallBack::Pinched { share, state: Box::new(state), hits: holding.hits }
@@ -88,18 +82,18 @@ fn momentum_lost(model: &Model, around: &Surroundings, old: &[Vec3], new: &[Vec3
         .fold([0.0; 3], |sum, block| add(sum, mat_vec(&around.metric.lumped[block], sub(old[block], new[block]))))
 }
 
-/// The segment with other velocities; what the fail-safe changed is booked as impulse over lumped masses.
-fn replaced(around: &Surroundings, mut refined: Refined, velocities: Vec<Vec3>, end: State) -> Refined {
-    for (block, (new, old)) in velocities.iter().zip(&refined.velocities).enumerate() {
+/// The part with other velocities; what the fail-safe changed is booked as impulse over lumped masses.
+fn replaced(around: &Surroundings, mut part: PartEnd, velocities: Vec<Vec3>, end: State) -> PartEnd {
+    for (block, (new, old)) in velocities.iter().zip(&part.velocities).enumerate() {
         if !around.metric.fixed[block] {
             let change = mat_vec(&around.metric.lumped[block], sub(*new, *old));
-            refined.block_impulses[block] = add(refined.block_impulses[block], change);
+            part.block_impulses[block] = add(part.block_impulses[block], change);
         }
     }
-    refined.velocities = velocities;
-    refined.end = end;
-    refined.hits.clear();
-    refined
+    part.velocities = velocities;
+    part.end = end;
+    part.hits.clear();
+    part
 }
 
 /// Witnesses of pairs that leave no room, at the state that was reached.

@@ -1,6 +1,6 @@
 //! Stages 1 and 2 of a segment: what drives it, and the metric.
 
-use super::advance::is_within_range;
+use super::inputs::is_within_range;
 use crate::constraint::Metric;
 use crate::dynamics::{Accelerations, Unconstrained};
 use crate::model::{BuildError, Drives, Model, Segment, StepError};
@@ -8,7 +8,7 @@ use crate::parallel::Par;
 
 /// What drives a segment, and the metric that it makes; reused from step to step.
 #[derive(Default)]
-pub(super) struct Driven {
+pub struct Driven {
     /// Unconstrained velocities and matrices of the bodies that the library drives.
     own: Unconstrained,
     /// Whether there are any.

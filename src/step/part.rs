@@ -1,0 +1,44 @@
+//! A part of a step as a method leaves it.
+
+use crate::contact_search::{Contact, Hit};
+use crate::math::Vec3;
+use crate::model::State;
+
+/// What a method gave a contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Solved {
+    /// Impulse on the first primitive, world frame `[N s]`.
+    pub impulse: Vec3,
+    /// First tangent of its friction frame.
+    pub tangent: Vec3,
+    /// It pushes, and its friction is inside the limit.
+    pub sticks: bool,
+}
+
+/// A contact with what a method gave it.
+#[derive(Clone, Copy, Debug)]
+pub struct SolvedContact {
+    /// The contact.
+    pub contact: Contact,
+    /// Gap that was asked for at the end of the part `[m]`.
+    pub required_gap: f64,
+    /// What it was given.
+    pub solved: Solved,
+    /// Whether the last response is with this contact; it has then a row.
+    pub is_row: bool,
+}
+
+/// The end of a part, clean if `hits` is empty.
+#[derive(Clone, Debug, Default)]
+pub struct PartEnd {
+    /// Velocity per block `[m/s]`.
+    pub velocities: Vec<Vec3>,
+    /// Contact impulse per block `[N s]`.
+    pub block_impulses: Vec<Vec3>,
+    /// End state, rounded to the hosts' formats.
+    pub end: State,
+    /// Contacts, in stable order.
+    pub contacts: Vec<SolvedContact>,
+    /// Pairs that came too close.
+    pub hits: Vec<Hit>,
+}
