@@ -591,7 +591,7 @@
 #define SGN_METHOD_IMPLICIT 0
 
 /**
- * Reserved: velocity filter. `SGN_ERROR_UNSUPPORTED` in this version.
+ * Velocity filter: repulsions, impulses with restitution, zones. Reads no system values, response is by lumped masses.
  */
 #define SGN_METHOD_VELOCITY_FILTER 1
 
@@ -692,7 +692,7 @@
 #define SGN_PHASE_START 1
 
 /**
- * A round: contacts, constrained dynamics, continuous detection.
+ * A round: contacts, constrained dynamics, continuous detection; or a pass of impulses.
  */
 #define SGN_PHASE_ROUND 2
 
@@ -1760,6 +1760,23 @@ typedef struct SgnStepDesc {
    * An `SGN_ZONE_FRICTION_` constant.
    */
   SgnZoneFriction zone_friction;
+  /**
+   * Velocity filter: coefficient of restitution of collisions, 0 to 1. Default: 0.
+   */
+  double restitution;
+  /**
+   * Velocity filter: stiffness of the springs between what is closer than its thickness, in units of effective mass over
+   * `dt^2`, 0 to 1e6; 1 makes up for the whole overlap in a step, but for the cap of `recovery_fraction`. 0: no springs.
+   */
+  double repulsion_stiffness;
+  /**
+   * Velocity filter: passes of impulses and continuous detection before the fail-safes, at most 1e6.
+   */
+  uint32_t passes_max;
+  /**
+   * Must be 0.
+   */
+  uint32_t reserved;
 } SgnStepDesc;
 
 /**
@@ -1779,11 +1796,11 @@ typedef struct SgnStepReport {
    */
   uint32_t active_contacts;
   /**
-   * Rounds of constraint manifold refinement, summed over the parts of the step.
+   * Rounds of constraint manifold refinement, or passes of the velocity filter, summed over the parts of the step.
    */
   uint32_t rounds;
   /**
-   * Outer solver iterations, summed.
+   * Outer solver iterations, or impulses of the velocity filter, summed.
    */
   uint32_t iterations;
   /**
@@ -1827,7 +1844,7 @@ typedef struct SgnStepReport {
    */
   double dynamics_residual;
   /**
-   * Work done by thickness recovery.
+   * Work done by thickness recovery; by springs of the velocity filter at most.
    */
   double recovery_work;
   /**

@@ -143,7 +143,7 @@ mod tests {
                 });
                 let after = rows.velocity(0, &v);
                 assert!(energy(&metric, &v) <= before * (1.0 + 1e-12), "e {restitution} mu {mu}");
-                assert_eq!(sticks, mu == 50.0);
+                assert!(if mu < 0.5 { !sticks } else { sticks || mu < 1.0 }, "e {restitution} mu {mu}");
                 if mu == 0.0 {
                     assert!((after[0] + restitution * u[0]).abs() < 1e-12);
                 }
