@@ -832,9 +832,41 @@
 #define SGN_WITNESS_KIND 4
 
 /**
+ * A motion from `x0` to `x1`; where the last call ended does not count.
+ */
+#define SGN_FILTER_MOTION 0
+
+/**
+ * Displacement mode, for recorded trajectories: the positions that the last call ended with move by `x1 - x0`, so that
+ * what contact changed stays. The first call starts at `x0`.
+ */
+#define SGN_FILTER_DISPLACEMENT 1
+
+/**
+ * Position mode, for recorded trajectories: the positions that the last call ended with move towards `x1`; `x0` is not
+ * read and may be NULL. Needs a call before it that gave a state.
+ */
+#define SGN_FILTER_POSITION 2
+
+/**
+ * Vertices of the first feature of a witness of a filter, U32X3 or U64X3; shorter features repeat their last vertex.
+ */
+#define SGN_WITNESS_FIRST_VERTICES 5
+
+/**
+ * Vertices of the second feature, in the same way.
+ */
+#define SGN_WITNESS_SECOND_VERTICES 6
+
+/**
  * Log, last error and executor of a host. Any number per process; nothing else is shared between them.
  */
 typedef struct SgnContext SgnContext;
+
+/**
+ * A mesh with its search tree and the positions that its last call ended with. Keep it from step to step.
+ */
+typedef struct SgnFilter SgnFilter;
 
 /**
  * Bodies, materials, systems and filters of a host, and what the contact method remembers of them.
@@ -1932,6 +1964,49 @@ typedef struct SgnCheckReport {
 typedef int32_t SgnWitnessAttribute;
 
 /**
+ * A mesh whose motion is filtered. Fill with `sgn_filter_desc_init`.
+ */
+typedef struct SgnFilterDesc {
+  /**
+   * Set by the init function.
+   */
+  uint32_t struct_size;
+  /**
+   * An `SGN_PRECISION_` constant: positions are certified after rounding to it. Default: F64.
+   */
+  SgnPrecision precision;
+  /**
+   * 0 or `SGN_BODY_NO_SELF_COLLISION`: no group collides with itself. Default: 0.
+   */
+  uint64_t flags;
+  /**
+   * Half of the thickness of a pair. Negative: a tenth of the mean edge length of each group. Default: -1.
+   */
+  double half_thickness;
+  /**
+   * Friction coefficient of everything, at least 0. Default: 0.
+   */
+  double friction;
+  /**
+   * The mesh at rest: parts of one group that rest closer than their thickness keep a fraction of that distance only.
+   */
+  struct SgnMesh mesh;
+  /**
+   * Masses, F32 or F64, one per vertex; 0 or infinite: scripted, the vertex goes where it is sent.
+   */
+  struct SgnView masses;
+  /**
+   * Group of each vertex, U32 or U64 below 2^32: a body. Empty: all are one. No triangle or edge spans two.
+   */
+  struct SgnView groups;
+} SgnFilterDesc;
+
+/**
+ * What the two positions of a call to `sgn_filter_run` are.
+ */
+typedef int32_t SgnFilterMode;
+
+/**
  * Every function of this header, in one table: a host that loads the library itself needs one symbol, `sgn_get_api`.
  * Fill with `sgn_api_init`. Functions keep their places; new ones are added at the end.
  */
@@ -2193,6 +2268,42 @@ typedef struct SgnApi {
    * See `sgn_world_set_wind`.
    */
   SgnResult (*world_set_wind)(struct SgnWorld *world, const double *wind);
+  /**
+   * See `sgn_filter_desc_init`.
+   */
+  SgnResult (*filter_desc_init)(struct SgnFilterDesc *desc, size_t size);
+  /**
+   * See `sgn_filter_create`.
+   */
+  SgnResult (*filter_create)(struct SgnContext *context,
+                             const struct SgnFilterDesc *desc,
+                             struct SgnFilter **out);
+  /**
+   * See `sgn_filter_destroy`.
+   */
+  SgnResult (*filter_destroy)(struct SgnFilter *filter);
+  /**
+   * See `sgn_filter_run`.
+   */
+  SgnResult (*filter_run)(struct SgnFilter *filter,
+                          SgnFilterMode mode,
+                          const struct SgnView *x0,
+                          const struct SgnView *x1,
+                          const struct SgnStepDesc *desc,
+                          const struct SgnViewMut *positions,
+                          const struct SgnViewMut *velocities,
+                          struct SgnStepReport *report);
+  /**
+   * See `sgn_filter_restart`.
+   */
+  SgnResult (*filter_restart)(struct SgnFilter *filter);
+  /**
+   * See `sgn_filter_pull_witnesses`.
+   */
+  SgnResult (*filter_pull_witnesses)(struct SgnFilter *filter,
+                                     SgnWitnessAttribute attribute,
+                                     const struct SgnViewMut *view,
+                                     uint64_t *count);
 } SgnApi;
 
 /**
@@ -2710,6 +2821,76 @@ SGN_API
 SgnResult sgn_world_snapshot_load(struct SgnWorld *world,
                                   const void *buffer,
                                   uint64_t size);
+
+/**
+ * Fills `desc` with defaults; `size` is `sizeof(SgnFilterDesc)`.
+ *
+ * Thread: any. Errors: NULL_ARGUMENT, BAD_STRUCT.
+ */
+SGN_API SgnResult sgn_filter_desc_init(struct SgnFilterDesc *desc, size_t size);
+
+/**
+ * Creates the filter of a mesh, for any simulation: it needs no world.
+ *
+ * Ownership: the caller destroys `*out` with `sgn_filter_destroy`; the filter keeps what it needs of the context.
+ * Thread: concurrent. Errors: NULL_ARGUMENT, BAD_STRUCT, UNSUPPORTED_STRUCT, INVALID_ARGUMENT, NON_FINITE_INPUT,
+ * BAD_TOPOLOGY, BUFFER_LAYOUT, OUT_OF_MEMORY, PANIC.
+ */
+SGN_API
+SgnResult sgn_filter_create(struct SgnContext *context,
+                            const struct SgnFilterDesc *desc,
+                            struct SgnFilter **out);
+
+/**
+ * Destroys a filter; NULL is allowed.
+ *
+ * Thread: exclusive. Errors: BUSY while another call is in the filter (it then lives on).
+ */
+SGN_API SgnResult sgn_filter_destroy(struct SgnFilter *filter);
+
+/**
+ * Filters a motion: positions at the end without any collision, and their mean velocities. What collides with nothing
+ * arrives at `x1`, to rounding. The start is checked first, unless it is where the last call ended; `desc` is that of a
+ * step, of which `method`, `solver` and what belongs to the implicit method are not read. With `SGN_STEP_CERTIFY` the
+ * end is certified by exact predicates. PINCHED carries a state, too: the outputs are then written.
+ *
+ * `x0`, `x1`: F32X3 or F64X3, one per vertex. `positions`, `velocities` (NULL: not wanted) take as many; velocities are
+ * `(positions - start)/dt`. Positions in F32X3 need the precision F32. `report` may be NULL.
+ *
+ * Thread: exclusive. Notes: TANGLED_PAIRS, FAIL_SAFE_USED. Errors (nothing is written and the state stays, PINCHED
+ * excepted): NULL_ARGUMENT, BAD_STRUCT, UNSUPPORTED_STRUCT, INVALID_ARGUMENT, NON_FINITE_INPUT, BUFFER_LAYOUT,
+ * INTERSECTING_START, PINCHED, OUT_OF_MEMORY, CANCELLED, BUSY, POISONED, PANIC.
+ */
+SGN_API
+SgnResult sgn_filter_run(struct SgnFilter *filter,
+                         SgnFilterMode mode,
+                         const struct SgnView *x0,
+                         const struct SgnView *x1,
+                         const struct SgnStepDesc *desc,
+                         const struct SgnViewMut *positions,
+                         const struct SgnViewMut *velocities,
+                         struct SgnStepReport *report);
+
+/**
+ * Forgets where the last call ended: the next one starts a trajectory of its own. The search tree stays.
+ *
+ * Thread: exclusive. Errors: NULL_ARGUMENT, BUSY, POISONED, PANIC.
+ */
+SGN_API SgnResult sgn_filter_restart(struct SgnFilter *filter);
+
+/**
+ * Pulls an attribute of the witnesses of the last call, if it was refused or pinched: SGN_WITNESS_BODIES (here groups),
+ * SGN_WITNESS_KIND, SGN_WITNESS_POINT, SGN_WITNESS_FIRST_VERTICES, SGN_WITNESS_SECOND_VERTICES. `view` and `count` as in
+ * sgn_world_pull_contacts.
+ *
+ * Thread: exclusive; so is the view's memory. Errors (nothing is then written): NULL_ARGUMENT, INVALID_ARGUMENT,
+ * BUFFER_LAYOUT, BUSY, POISONED, PANIC.
+ */
+SGN_API
+SgnResult sgn_filter_pull_witnesses(struct SgnFilter *filter,
+                                    SgnWitnessAttribute attribute,
+                                    const struct SgnViewMut *view,
+                                    uint64_t *count);
 
 /**
  * Fills `api` with zeros and its size; `size` is `sizeof(SgnApi)`.

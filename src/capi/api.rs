@@ -6,9 +6,10 @@ use super::structs::{self, Growing};
 use super::version::SGN_ABI_VERSION;
 use super::{
     SgnBodyId, SgnBodyInfo, SgnCapability, SgnCheckReport, SgnContactAttribute, SgnContext, SgnContextDesc,
-    SgnDeformableDesc, SgnErrorInfo, SgnHalfSpaceDesc, SgnKinematicDesc, SgnMaterialDesc, SgnMaterialId, SgnResult,
-    SgnRigidDesc, SgnShapeDesc, SgnSheetDesc, SgnSlot, SgnSolidDesc, SgnStepDesc, SgnStepReport, SgnSystemDesc,
-    SgnSystemId, SgnVersion, SgnView, SgnViewMut, SgnWitnessAttribute, SgnWorld, SgnWorldDesc,
+    SgnDeformableDesc, SgnErrorInfo, SgnFilter, SgnFilterDesc, SgnFilterMode, SgnHalfSpaceDesc, SgnKinematicDesc,
+    SgnMaterialDesc, SgnMaterialId, SgnResult, SgnRigidDesc, SgnShapeDesc, SgnSheetDesc, SgnSlot, SgnSolidDesc,
+    SgnStepDesc, SgnStepReport, SgnSystemDesc, SgnSystemId, SgnVersion, SgnView, SgnViewMut, SgnWitnessAttribute,
+    SgnWorld, SgnWorldDesc,
 };
 use std::ffi::{c_char, c_void};
 
@@ -200,12 +201,48 @@ pub struct SgnApi {
     pub world_set_gravity: Option<unsafe extern "C" fn(world: *mut SgnWorld, gravity: *const f64) -> SgnResult>,
     /// See `sgn_world_set_wind`.
     pub world_set_wind: Option<unsafe extern "C" fn(world: *mut SgnWorld, wind: *const f64) -> SgnResult>,
+    /// See `sgn_filter_desc_init`.
+    pub filter_desc_init: Option<unsafe extern "C" fn(desc: *mut SgnFilterDesc, size: usize) -> SgnResult>,
+    /// See `sgn_filter_create`.
+    pub filter_create: Option<
+        unsafe extern "C" fn(
+            context: *mut SgnContext,
+            desc: *const SgnFilterDesc,
+            out: *mut *mut SgnFilter,
+        ) -> SgnResult,
+    >,
+    /// See `sgn_filter_destroy`.
+    pub filter_destroy: Option<unsafe extern "C" fn(filter: *mut SgnFilter) -> SgnResult>,
+    /// See `sgn_filter_run`.
+    pub filter_run: Option<
+        unsafe extern "C" fn(
+            filter: *mut SgnFilter,
+            mode: SgnFilterMode,
+            x0: *const SgnView,
+            x1: *const SgnView,
+            desc: *const SgnStepDesc,
+            positions: *const SgnViewMut,
+            velocities: *const SgnViewMut,
+            report: *mut SgnStepReport,
+        ) -> SgnResult,
+    >,
+    /// See `sgn_filter_restart`.
+    pub filter_restart: Option<unsafe extern "C" fn(filter: *mut SgnFilter) -> SgnResult>,
+    /// See `sgn_filter_pull_witnesses`.
+    pub filter_pull_witnesses: Option<
+        unsafe extern "C" fn(
+            filter: *mut SgnFilter,
+            attribute: SgnWitnessAttribute,
+            view: *const SgnViewMut,
+            count: *mut u64,
+        ) -> SgnResult,
+    >,
 }
 
 // SAFETY: repr(C) without padding; numbers and nullable function pointers.
 unsafe impl Growing for SgnApi {
     const NAME: &'static str = "SgnApi";
-    const FIRST_SIZE: usize = 440;
+    const FIRST_SIZE: usize = 488;
     fn defaults() -> Self {
         // SAFETY: all zero is a valid table of no functions.
         unsafe { std::mem::zeroed() }
@@ -295,4 +332,10 @@ const TABLE: SgnApi = SgnApi {
     solid_create: Some(super::sgn_solid_create),
     world_set_gravity: Some(super::sgn_world_set_gravity),
     world_set_wind: Some(super::sgn_world_set_wind),
+    filter_desc_init: Some(super::sgn_filter_desc_init),
+    filter_create: Some(super::sgn_filter_create),
+    filter_destroy: Some(super::sgn_filter_destroy),
+    filter_run: Some(super::sgn_filter_run),
+    filter_restart: Some(super::sgn_filter_restart),
+    filter_pull_witnesses: Some(super::sgn_filter_pull_witnesses),
 };

@@ -7,7 +7,7 @@
 //! * `views`: strided host memory, read and written element by element
 //! * `version`, `api`: version, capabilities, the table for hosts that load the library themselves
 //! * `context`, `world`, `material`, `description`, `body`, `model`, `shape`, `drive`, `system`, `step`, `query`,
-//!   `snapshot`: the functions, by noun
+//!   `snapshot`, `filter`: the functions, by noun
 //!
 //! Every export returns a status, runs behind a panic boundary and writes its outputs only when it succeeds. The
 //! header is generated from these files by `tests/capi`, comments included.
@@ -21,6 +21,7 @@ mod boundary;
 mod context;
 mod description;
 mod drive;
+mod filter;
 mod float_environment;
 mod material;
 mod model;
@@ -40,6 +41,7 @@ pub use body::*;
 pub use context::*;
 pub use description::*;
 pub use drive::*;
+pub use filter::*;
 pub use material::*;
 pub use model::*;
 pub use query::*;

@@ -86,24 +86,24 @@ unsafe impl Growing for SgnCheckReport {
     }
 }
 
-enum Table {
+pub(super) enum Table {
     Floats(usize, Vec<f64>),
     Integers(usize, Vec<u64>),
 }
 
-fn vectors<T>(list: &[T], get: impl Fn(&T) -> Vec3) -> Table {
+pub(super) fn vectors<T>(list: &[T], get: impl Fn(&T) -> Vec3) -> Table {
     Table::Floats(3, list.iter().flat_map(get).collect())
 }
 
-fn integers<T>(list: &[T], get: impl Fn(&T) -> u64) -> Table {
+pub(super) fn integers<T>(list: &[T], get: impl Fn(&T) -> u64) -> Table {
     Table::Integers(1, list.iter().map(get).collect())
 }
 
-fn pairs<T>(list: &[T], get: impl Fn(&T) -> [u64; 2]) -> Table {
+pub(super) fn pairs<T>(list: &[T], get: impl Fn(&T) -> [u64; 2]) -> Table {
     Table::Integers(2, list.iter().flat_map(get).collect())
 }
 
-fn unknown(attribute: i32) -> Failure {
+pub(super) fn unknown(attribute: i32) -> Failure {
     let message = format!("attribute {attribute} is out of range");
     Failure::new(SGN_ERROR_INVALID_ARGUMENT, message).value(f64::from(attribute))
 }
@@ -137,7 +137,7 @@ fn witness_table(world: &World, attribute: SgnWitnessAttribute) -> Result<Table,
 }
 
 /// Writes a table into a view that may be NULL, and the number of rows that there are.
-unsafe fn hand_over(table: &Table, view: *const SgnViewMut, count: *mut u64) -> Status {
+pub(super) unsafe fn hand_over(table: &Table, view: *const SgnViewMut, count: *mut u64) -> Status {
     let column = match table {
         Table::Floats(lanes, data) => Column::Floats(*lanes, data),
         Table::Integers(lanes, data) => Column::Integers(*lanes, data),

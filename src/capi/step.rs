@@ -204,7 +204,7 @@ fn invalid(what: &str, value: f64) -> Failure {
 }
 
 impl SgnStepDesc {
-    fn settings(&self) -> Result<Settings, Failure> {
+    pub(super) fn settings(&self) -> Result<Settings, Failure> {
         let method = match self.method {
             SGN_METHOD_IMPLICIT => Method::ImplicitContact,
             SGN_METHOD_VELOCITY_FILTER => Method::VelocityFilter,
@@ -366,7 +366,7 @@ unsafe impl Growing for SgnStepReport {
 }
 
 impl SgnStepReport {
-    fn of(report: &StepReport) -> SgnStepReport {
+    pub(super) fn of(report: &StepReport) -> SgnStepReport {
         let notes = [
             (report.not_converged, SGN_STEP_NOT_CONVERGED),
             (report.parts > 1, SGN_STEP_SUBDIVIDED),
@@ -407,7 +407,7 @@ impl SgnStepReport {
     }
 
     /// The gravest note.
-    fn note(&self) -> SgnResult {
+    pub(super) fn note(&self) -> SgnResult {
         [
             (SGN_STEP_TANGLED_PAIRS, SGN_NOTE_TANGLED_PAIRS),
             (SGN_STEP_FAIL_SAFE_USED, SGN_NOTE_FAIL_SAFE_USED),
@@ -473,7 +473,7 @@ pub unsafe extern "C" fn sgn_world_step(
                 Ok(given) => {
                     let answer = hand_over(&given);
                     let level = if answer.notes == 0 { SGN_LOG_INFO } else { SGN_LOG_WARNING };
-                    context.log(level, || summary(&answer));
+                    context.log(level, || summary("sgn_world_step", &answer));
                     Ok(answer.note())
                 }
                 Err(failure) => {
@@ -502,17 +502,17 @@ pub unsafe extern "C" fn sgn_world_cancel(world: *mut SgnWorld) -> SgnResult {
 }
 
 /// The host as it watches a step.
-struct ProgressOfHost<'a> {
-    callback: SgnProgressCallback,
-    user: *mut c_void,
-    cancelled: &'a AtomicBool,
+pub(super) struct ProgressOfHost<'a> {
+    pub callback: SgnProgressCallback,
+    pub user: *mut c_void,
+    pub cancelled: &'a AtomicBool,
 }
 
 // SAFETY: the callback is called on the thread that steps, and nowhere else; the rest is atomic or constant.
 unsafe impl Sync for ProgressOfHost<'_> {}
 
 impl ProgressOfHost<'_> {
-    fn goes_on(&self, phase: Phase, fraction: f64) -> bool {
+    pub fn goes_on(&self, phase: Phase, fraction: f64) -> bool {
         let number = match phase {
             Phase::Dynamics => SGN_PHASE_DYNAMICS,
             Phase::Start => SGN_PHASE_START,
@@ -525,9 +525,10 @@ impl ProgressOfHost<'_> {
     }
 }
 
-fn summary(report: &SgnStepReport) -> String {
+/// A line for the log.
+pub(super) fn summary(function: &str, report: &SgnStepReport) -> String {
     format!(
-        "sgn_world_step: {} contacts, {} with an impulse, {} rounds, {} iterations, {} parts, {} projected and \
+        "{function}: {} contacts, {} with an impulse, {} rounds, {} iterations, {} parts, {} projected and \
          {} rigid zones, {} held vertices, {} tangled pairs, residuals {:.1e} {:.1e} {:.1e}, {:.0} us",
         report.contacts,
         report.active_contacts,

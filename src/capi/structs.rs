@@ -114,6 +114,7 @@ mod tests {
         check::<SgnContextDesc>(&mut wrong);
         check::<SgnDeformableDesc>(&mut wrong);
         check::<SgnErrorInfo>(&mut wrong);
+        check::<SgnFilterDesc>(&mut wrong);
         check::<SgnHalfSpaceDesc>(&mut wrong);
         check::<SgnKinematicDesc>(&mut wrong);
         check::<SgnMaterialDesc>(&mut wrong);

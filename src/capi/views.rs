@@ -285,6 +285,25 @@ pub(super) fn is_single(format: SgnFormat) -> bool {
 /// # Safety
 /// The view's memory is readable.
 pub(super) unsafe fn floats<const N: usize>(view: &SgnView, what: &str) -> Result<Vec<[f64; N]>, Failure> {
+    // SAFETY: passed on.
+    unsafe { floats_with(view, what, f64::is_finite) }
+}
+
+/// Reads masses, which may be infinite.
+///
+/// # Safety
+/// As for [`floats`].
+pub(super) unsafe fn masses(view: &SgnView, what: &str) -> Result<Vec<f64>, Failure> {
+    // SAFETY: passed on.
+    let list = unsafe { floats_with::<1>(view, what, |mass| mass.is_finite() || mass == f64::INFINITY) }?;
+    Ok(list.into_iter().map(|[mass]| mass).collect())
+}
+
+unsafe fn floats_with<const N: usize>(
+    view: &SgnView,
+    what: &str,
+    allowed: impl Fn(f64) -> bool,
+) -> Result<Vec<[f64; N]>, Failure> {
     let layout = layout(view, what)?;
     if layout.lanes != N || !matches!(layout.scalar, Scalar::F32 | Scalar::F64) {
         return Err(layout_error(
@@ -299,7 +318,7 @@ pub(super) unsafe fn floats<const N: usize>(view: &SgnView, what: &str) -> Resul
         for (lane, value) in element.iter_mut().enumerate() {
             // SAFETY: within the view.
             *value = unsafe { layout.float(index, lane) };
-            if !value.is_finite() {
+            if !allowed(*value) {
                 let message = format!("{what}[{index}] is {value}");
                 return Err(Failure::new(SGN_ERROR_NON_FINITE_INPUT, message).index(index).value(*value));
             }

@@ -10,6 +10,7 @@
 //! * `drive`: what is pushed before a step
 //! * `step`: the step
 //! * `query`: what is pulled after it; check
+//! * `motion_filter`: the velocity filter alone, over positions before and after
 //! * `archive`: values as bytes
 //! * `snapshot`: the whole world as bytes, and its hash
 
@@ -21,6 +22,7 @@ mod ids;
 mod material;
 mod model_archive;
 mod model_body;
+mod motion_filter;
 mod query;
 mod snapshot;
 mod step;
@@ -30,6 +32,7 @@ mod system;
 pub use body::{BodyOptions, DeformableDescription, KinematicDescription, RigidDescription};
 pub use error::{Fault, WorldError};
 pub use model_body::{NodeForces, SheetDescription, SheetModel, SolidDescription};
+pub use motion_filter::{FilterWitness, Motion, MotionFilter, MotionFilterDescription};
 pub use query::{BodyInfo, BodyKind, Outcome};
 pub use snapshot::SNAPSHOT_FORMAT;
 pub use step::StepFailure;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// Files of `src/capi` in the order of the header.
-const SOURCES: [&str; 15] = [
+const SOURCES: [&str; 16] = [
     "status",
     "version",
     "views",
@@ -19,6 +19,7 @@ const SOURCES: [&str; 15] = [
     "step",
     "query",
     "snapshot",
+    "filter",
 ];
 
 fn root() -> &'static Path {

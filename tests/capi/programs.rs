@@ -33,6 +33,19 @@ fn bodies_of_the_library_through_the_c_abi() {
     passes("model.c", Standard::C99);
 }
 
+#[test]
+fn a_recorded_cloth_is_kept_above_a_roof() {
+    let text = run("examples/c/filter.c", Standard::C99, &[]);
+    assert_eq!(text.lines().count(), 6, "{text}");
+    assert!(text.lines().all(|line| line.ends_with(" 0 intersections")), "{text}");
+    assert!(text.contains("recorded 0.300, filtered 0.5"), "{text}");
+}
+
+#[test]
+fn the_filter_alone_through_the_c_abi() {
+    passes("filter.c", Standard::C99);
+}
+
 fn passes(name: &str, standard: Standard) {
     let text = run(&format!("tests/capi/programs/{name}"), standard, &[]);
     assert!(text.lines().any(|line| line == "PASS"), "{name}:\n{text}");

@@ -17,6 +17,7 @@ mod filter_examples;
 mod friction;
 mod inputs;
 mod momentum;
+mod motion_filter;
 mod pinch;
 mod resting;
 mod rows;

@@ -13,6 +13,9 @@ use signorini::model::{BodyDescription, FailSafe, Kind, Material, Materials, Mod
 
 const RANK_CUT: f64 = 1e-6;
 
+/// Linear entries, angular entries, normal.
+type Stencil = (Vec<(u32, f64)>, Vec<(u32, Vec3)>, Vec3);
+
 fn isotropic(m: f64) -> Mat3 {
     [[m, 0.0, 0.0], [0.0, m, 0.0], [0.0, 0.0, m]]
 }
@@ -42,7 +45,7 @@ fn random_zone(random: &mut Random, rows: usize, (decades, tilt): (f64, f64), sc
         made.block(inertia, scale(3.0, random.vector()));
     }
     made.finish();
-    let mut earlier: Vec<(Vec<(u32, f64)>, Vec<(u32, Vec3)>, Vec3)> = Vec::new();
+    let mut earlier: Vec<Stencil> = Vec::new();
     while made.rows.len() < rows {
         let kind = random.unit();
         let (linear, angular, normal) = if kind < 0.35 && !earlier.is_empty() {
@@ -224,7 +227,7 @@ fn projections_keep_momentum_never_raise_energy_and_change_nothing_twice() {
                     let (v, projection) = projected(&made, fail_safe, friction);
                     // Blocks after the vertices alternate, linear and angular.
                     let vertices = v.len() - 6;
-                    let linear = |b: usize| b < vertices || (b - vertices) % 2 == 0;
+                    let linear = |b: usize| b < vertices || (b - vertices).is_multiple_of(2);
                     let ((before, size), (after, _)) =
                         (momentum(&made, &made.velocities, linear), momentum(&made, &v, linear));
                     assert!(norm(sub(after, before)) < 1e-12 * size, "{what}: {:e}", norm(sub(after, before)) / size);
@@ -359,8 +362,8 @@ fn two_particles_against_a_wall_end_at_once() {
     // One by one: halves for ever.
     let (mut a, mut b) = (1.0, 1.0);
     for _ in 0..40 {
-        b = 0.0 * b;
-        (a, b) = (0.5 * (a + b), 0.5 * (a + b));
+        // The second stops at the wall, then the first shares with it.
+        (a, b) = (0.5 * (a + 0.0 * b), 0.5 * (a + 0.0 * b));
     }
     assert!(a > 0.0 && b > 0.0);
 }

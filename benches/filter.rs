@@ -1,0 +1,136 @@
+//! The velocity filter alone: what a call costs with 0, 1, 5 and 20 % of the vertices colliding, from 1e3 to 3e5 vertices.
+//!
+//! `cargo bench --bench filter`: processor milliseconds of a call on one thread, start check and certificate included, the
+//! tree kept from call to call; median of the calls after the first. A share of a flat cloth is sent through scripted
+//! cloth right below it, the rest freely down; everything drifts, so that no box of the call before holds.
+//! Words: `quick` (to 3e4 vertices), `inelastic`, `rigid`.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+#[allow(dead_code, unused_imports)]
+mod support;
+
+use signorini::math::{Vec3, add};
+use signorini::model::{FailSafe, Precision, Settings, StepReport, Watch};
+use signorini::parallel::Par;
+use signorini::world::{Motion, MotionFilter, MotionFilterDescription, Topology};
+use support::clock::thread_seconds;
+use support::random::Random;
+use support::shapes::{Triangles, cloth_grid};
+
+const DT: f64 = 1.0 / 60.0;
+
+/// Length of an edge; everything else follows.
+const EDGE: f64 = 0.01;
+
+struct Scene {
+    x: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    masses: Vec<f64>,
+    groups: Vec<u32>,
+    /// Way of each vertex in a call.
+    way: Vec<Vec3>,
+}
+
+/// A cloth of about `count` vertices over scripted cloth that a share of them is sent through.
+fn scene(count: usize, share: f64) -> Scene {
+    let n = (count as f64).sqrt().round() as usize;
+    let size = EDGE * (n - 1) as f64;
+    let mut random = Random::new(1);
+    let mut scene = Scene { x: vec![], triangles: vec![], masses: vec![], groups: vec![], way: vec![] };
+    let mut push = |part: &Triangles, at: Vec3, mass: f64, way: Vec3| {
+        let first = scene.x.len() as u32;
+        for x in &part.positions {
+            scene.x.push(add(add(*x, at), random.within(0.02 * EDGE)));
+            scene.way.push(add(way, random.within(0.02 * EDGE)));
+        }
+        scene.triangles.extend(part.faces.iter().map(|f| f.map(|v| v + first)));
+        scene.masses.resize(scene.x.len(), mass);
+        scene.groups.resize(scene.x.len(), u32::from(mass == 0.0));
+    };
+    push(&cloth_grid(n, size), [0.0; 3], 1e-3, [0.05 * EDGE, 0.0, -0.6 * EDGE]);
+    let below = (share * (n * n) as f64).sqrt().round() as usize;
+    if below > 1 {
+        // Shifted by a part of an edge, so that faces meet vertices and edges cross.
+        let at = [0.31 * EDGE, 0.17 * EDGE, -0.4 * EDGE];
+        push(&cloth_grid(below, EDGE * (below - 1) as f64), at, 0.0, [0.0; 3]);
+    }
+    scene
+}
+
+/// Median seconds of a call, and the report of the last.
+fn measure(scene: &Scene, settings: &Settings, calls: usize) -> (f64, StepReport) {
+    let mut filter = MotionFilter::new(MotionFilterDescription {
+        rest: scene.x.clone(),
+        topology: Topology { triangles: scene.triangles.clone(), ..Topology::default() },
+        masses: scene.masses.clone(),
+        groups: scene.groups.clone(),
+        half_thickness: Some(0.05 * EDGE),
+        friction_coefficient: 0.2,
+        self_collision: true,
+        precision: Precision::Double,
+    })
+    .unwrap();
+    let mut seconds = Vec::new();
+    let mut last = StepReport::default();
+    for call in 0..calls {
+        let drift = [0.3 * EDGE * call as f64, 0.2 * EDGE * call as f64, 0.0];
+        let x0: Vec<Vec3> = scene.x.iter().map(|x| add(*x, drift)).collect();
+        let x1: Vec<Vec3> = x0.iter().zip(&scene.way).map(|(x, w)| add(*x, *w)).collect();
+        let from = thread_seconds();
+        let report = filter.run(Motion::Between(&x0, &x1), settings, DT, Par::Serial, Watch::default());
+        seconds.push(thread_seconds() - from);
+        last = report.unwrap_or_else(|failure| panic!("{:?}", failure.error));
+        assert_eq!(last.intersections, Some(0));
+    }
+    seconds.remove(0);
+    seconds.sort_by(f64::total_cmp);
+    (seconds[seconds.len() / 2], last)
+}
+
+fn main() {
+    let words: Vec<String> = std::env::args().collect();
+    let has = |word: &str| words.iter().any(|w| w == word);
+    let fail_safe = if has("inelastic") {
+        FailSafe::InelasticProjection
+    } else if has("rigid") {
+        FailSafe::RigidZone
+    } else {
+        FailSafe::UnilateralProjection
+    };
+    let settings = Settings { certify: true, fail_safe, ..Settings::default() };
+    println!(
+        "vertices,share,milliseconds,contacts,active,passes,projected,rigid,held,start+certificate,search,detection,response,fail_safe"
+    );
+    let counts = if has("quick") { &[1_000, 10_000][..] } else { &[1_000, 3_000, 10_000, 30_000, 100_000, 300_000] };
+    for share in [0.0, 0.01, 0.02, 0.05, 0.2] {
+        let mut first = None;
+        let mut line = (0, 0.0);
+        for count in counts {
+            let scene = scene(*count, share);
+            let (seconds, r) = measure(&scene, &settings, if *count > 50_000 { 4 } else { 10 });
+            let ms = |microseconds: f64| 1e-3 * microseconds;
+            println!(
+                "{},{share},{:.2},{},{},{},{},{},{},{:.1},{:.1},{:.1},{:.1},{:.1}",
+                scene.x.len(),
+                1e3 * seconds,
+                r.contacts,
+                r.active_contacts,
+                r.rounds,
+                r.projected_zones,
+                r.rigid_zones,
+                r.held_vertices,
+                ms(r.times.certificate),
+                ms(r.times.search),
+                ms(r.times.detection),
+                ms(r.times.solve),
+                ms(r.times.fail_safe),
+            );
+            line = (scene.x.len(), seconds);
+            first = first.or(Some(line));
+        }
+        if let Some((count, seconds)) = first.filter(|(count, _)| *count != line.0) {
+            let slope = (line.1 / seconds).ln() / (line.0 as f64 / count as f64).ln();
+            println!("share {share}: slope {slope:.2}");
+        }
+    }
+}
