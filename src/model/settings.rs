@@ -3,7 +3,7 @@
 /// Contact method of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// Implicit contact: constraint manifold refinement around iterative constraint anticipation [Otaduy09].
+    /// Implicit contact: constraint manifold refinement around iterative constraint anticipation [Otaduy09, §3-5].
     #[default]
     ImplicitContact,
     /// Velocity filter: repulsions, impulses, zones [Harmon10, ch. 3].
