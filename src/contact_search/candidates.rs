@@ -25,7 +25,16 @@ struct Anchor {
     factor: f64,
     /// The boxes searched, by vertex.
     boxes: Vec<Aabb>,
+    /// Pairs found when all of them were searched, and how often boxes were widened since.
+    pairs: usize,
+    widened: u32,
 }
+
+/// Boxes are widened this often at most before all are searched anew.
+const WIDENED_MAX: u32 = 4;
+
+/// All boxes are searched anew where more than one vertex in so many has left its own.
+const FEW: usize = 8;
 
 /// Continuous detection keeps half the thickness at most, and may raise an alarm a thousandth farther away: boxes that
 /// are thickened by this many half thicknesses hold all it can find.
@@ -46,8 +55,28 @@ impl CandidateSearch {
         factor: f64,
         par: Par,
     ) -> &Candidates {
-        if self.anchor.as_ref().is_some_and(|anchor| anchor.holds(model, filter, x0, x1, factor)) {
-            return &self.candidates;
+        if let Some(anchor) = self.anchor.as_mut().filter(|anchor| anchor.is_for(model, filter, factor, x0.len())) {
+            let outside = anchor.outside(model, x0, x1, factor);
+            let count = outside.iter().filter(|left| **left).count();
+            if count == 0 {
+                return &self.candidates;
+            }
+            let pairs = self.candidates.vertex_face.len() + self.candidates.edge_edge.len();
+            let grown = pairs > anchor.pairs + anchor.pairs / 4;
+            let finite = (0..x0.len()).all(|v| !outside[v] || (is_finite(x0[v]) && is_finite(x1[v])));
+            if anchor.widened < WIDENED_MAX && count * FEW <= x0.len() && !grown && finite {
+                // What has left its box is searched again, within a box that holds both ways.
+                anchor.widened += 1;
+                for v in (0..x0.len()).filter(|v| outside[*v]) {
+                    let radius = (factor + 1.0) * model.bodies[model.vertex_body[v] as usize].half_thickness;
+                    anchor.boxes[v] = anchor.boxes[v].union(&Aabb::swept(x0[v], x1[v], radius));
+                }
+                let broad_phase = tree(&mut self.broad_phase, model);
+                broad_phase.refit_to(&anchor.boxes, par);
+                let allowed = |a, b| allowed(model, filter, a, b);
+                broad_phase.add_candidates(&outside, &allowed, &mut self.candidates, par);
+                return &self.candidates;
+            }
         }
         let radius = half_thicknesses(model, factor + 1.0);
         let broad_phase = tree(&mut self.broad_phase, model);
@@ -56,7 +85,9 @@ impl CandidateSearch {
         let mut boxes = self.anchor.take().map(|anchor| anchor.boxes).unwrap_or_default();
         boxes.clear();
         boxes.extend_from_slice(broad_phase.boxes());
-        self.anchor = Some(Anchor { topology: model.topology_hash, filter: filter.fingerprint(), factor, boxes });
+        let (topology, filter) = (model.topology_hash, filter.fingerprint());
+        let pairs = self.candidates.vertex_face.len() + self.candidates.edge_edge.len();
+        self.anchor = Some(Anchor { topology, filter, factor, boxes, pairs, widened: 0 });
         &self.candidates
     }
 
@@ -89,19 +120,24 @@ fn allowed(model: &Model, filter: &BodyFilter, a: u32, b: u32) -> bool {
 }
 
 impl Anchor {
-    fn holds(&self, model: &Model, filter: &BodyFilter, x0: &[Vec3], x1: &[Vec3], factor: f64) -> bool {
-        let within = |(v, searched): (usize, &Aabb)| {
+    /// Whether the boxes are those of this model, filter and factor.
+    fn is_for(&self, model: &Model, filter: &BodyFilter, factor: f64, vertices: usize) -> bool {
+        self.topology == model.topology_hash
+            && self.filter == filter.fingerprint()
+            && self.factor == factor
+            && self.boxes.len() == vertices
+    }
+
+    /// Which vertices leave their box: at `x0` with `factor`, on their way with half of one to spare.
+    fn outside(&self, model: &Model, x0: &[Vec3], x1: &[Vec3], factor: f64) -> Vec<bool> {
+        let leaves = |(v, searched): (usize, &Aabb)| {
             let half_thickness = model.bodies[model.vertex_body[v] as usize].half_thickness;
             let near = Aabb::swept(x0[v], x0[v], factor * half_thickness);
             let way = Aabb::swept(x0[v], x1[v], SWEPT_REACH * half_thickness);
             // The box of a number that is none would be that of the other end.
-            is_finite(x0[v]) && is_finite(x1[v]) && searched.contains(&near.union(&way))
+            !(is_finite(x0[v]) && is_finite(x1[v]) && searched.contains(&near.union(&way)))
         };
-        self.topology == model.topology_hash
-            && self.filter == filter.fingerprint()
-            && self.factor == factor
-            && self.boxes.len() == x0.len()
-            && self.boxes.iter().enumerate().all(within)
+        self.boxes.iter().enumerate().map(leaves).collect()
     }
 }
 

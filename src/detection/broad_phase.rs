@@ -8,7 +8,7 @@ use super::bvh::{Bvh, Frame, LEAF, MIXED, PackedBox};
 use super::leaf_blocks::{Block, LeafBlocks};
 use super::leaf_pairs::Side;
 use super::ownership::{Ownership, own};
-use super::pair_lists::{PairBuffer, PairLists, merge};
+use super::pair_lists::{PairBuffer, PairLists, merge, unite};
 use super::primitives::{Candidates, Filter, Motion, Primitives};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
@@ -78,10 +78,21 @@ impl BroadPhase {
         let motion = Motion { x0, x1, radius };
         self.boxes.resize(x0.len(), Aabb::EMPTY);
         par.map_into(&mut self.boxes, |v| motion.vertex_box(v as u32));
+        self.fit_boxes(par);
+    }
+
+    /// Fits the tree to boxes, one for every vertex index. Cost and candidates as of [`BroadPhase::refit`].
+    pub fn refit_to(&mut self, boxes: &[Aabb], par: Par) {
+        self.boxes.clear();
+        self.boxes.extend_from_slice(boxes);
+        self.fit_boxes(par);
+    }
+
+    fn fit_boxes(&mut self, par: Par) {
         // A union does not depend on the order.
         let bounds = self.boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b));
         let frame = Frame::of(&bounds);
-        self.packed.resize(x0.len(), PackedBox::EMPTY);
+        self.packed.resize(self.boxes.len(), PackedBox::EMPTY);
         let boxes = &self.boxes;
         par.map_into(&mut self.packed, |v| frame.packed(&boxes[v]));
         if !self.built {
@@ -144,14 +155,38 @@ impl BroadPhase {
     ///
     /// Sorted; the same for every tree and number of threads. Cost: `n log n` plus the pairs.
     pub fn candidates(&self, filter: &Filter, out: &mut Candidates, par: Par) {
-        let [vertex_face, edge_edge] = self.traverse(Wanted::Contacts, filter, par);
+        let [vertex_face, edge_edge] = self.traverse(Wanted::Contacts, None, filter, par);
         merge(vertex_face, self.boxes.len(), &mut out.vertex_face, par);
         merge(edge_edge, self.edges.len(), &mut out.edge_edge, par);
     }
 
+    /// Adds to `out` the pairs of [`BroadPhase::candidates`] that have a vertex for which `woken` says yes, so that it stays
+    /// sorted and has each pair once.
+    ///
+    /// Cost: linear, plus what the leaves with such vertices meet.
+    pub fn add_candidates(&self, woken: &[bool], filter: &Filter, out: &mut Candidates, par: Par) {
+        let awake: Vec<bool> = (0..self.leaves.len() as u32)
+            .map(|leaf| {
+                self.leaf_vertices.holds(leaf, woken)
+                    || self.leaf_edges.holds(leaf, woken)
+                    || self.leaf_faces.holds(leaf, woken)
+            })
+            .collect();
+        let [vertex_face, edge_edge] = self.traverse(Wanted::Contacts, Some(&awake), filter, par);
+        let any = |corners: &[u32]| corners.iter().any(|v| woken[*v as usize]);
+        let edge = |e: u32| any(&self.edges[e as usize]);
+        let mut found = Vec::new();
+        merge(vertex_face, self.boxes.len(), &mut found, par);
+        found.retain(|[v, f]| woken[*v as usize] || any(&self.faces[*f as usize]));
+        unite(&mut out.vertex_face, &found);
+        merge(edge_edge, self.edges.len(), &mut found, par);
+        found.retain(|[a, b]| edge(*a) || edge(*b));
+        unite(&mut out.edge_edge, &found);
+    }
+
     /// Edge-face pairs whose boxes overlap, that share no vertex, and that the filter lets pass; sorted.
     pub fn edge_face_candidates(&self, filter: &Filter, out: &mut Candidates, par: Par) {
-        let [edge_face, _] = self.traverse(Wanted::EdgeFace, filter, par);
+        let [edge_face, _] = self.traverse(Wanted::EdgeFace, None, filter, par);
         merge(edge_face, self.edges.len(), &mut out.edge_face, par);
     }
 
@@ -160,9 +195,10 @@ impl BroadPhase {
         self.ownership.representatives[component as usize]
     }
 
-    fn traverse(&self, wanted: Wanted, filter: &Filter, par: Par) -> [PairLists; 2] {
+    /// All pairs of leaves, or those with a leaf that is `awake`.
+    fn traverse(&self, wanted: Wanted, awake: Option<&[bool]>, filter: &Filter, par: Par) -> [PairLists; 2] {
         let count = self.leaves.len();
-        let task = |start: usize| Task { tree: self, wanted, filter, leaves: start..count.min(start + TASK) };
+        let task = |start: usize| Task { tree: self, wanted, awake, filter, leaves: start..count.min(start + TASK) };
         let mut tasks: Vec<_> = (0..count).step_by(TASK).map(|i| (task(i), Found::default())).collect();
         par.for_each_task(&mut tasks, |(task, found)| *found = run_eight(task.clone()));
         tasks.into_iter().map(|(_, found)| found).unzip().into()
@@ -174,6 +210,7 @@ impl BroadPhase {
 struct Task<'a> {
     tree: &'a BroadPhase,
     wanted: Wanted,
+    awake: Option<&'a [bool]>,
     filter: &'a Filter<'a>,
     leaves: Range<usize>,
 }
@@ -188,9 +225,14 @@ impl EightKernel for Task<'_> {
     fn run<E: Eight>(self, eight: E) -> Found {
         let mut found = Found::default();
         let mut near = Vec::new();
+        let sleeps = |leaf: u32| self.awake.is_some_and(|awake| !awake[leaf as usize]);
         for a in self.leaves.start as u32..self.leaves.end as u32 {
-            self.list(eight, a, &mut near);
-            for b in &near {
+            if sleeps(a) {
+                continue;
+            }
+            // A leaf meets those behind it, and those before it that sleep.
+            self.list(eight, a, if self.awake.is_some() { 0 } else { a }, &mut near);
+            for b in near.iter().filter(|b| **b >= a || sleeps(**b)) {
                 match self.wanted {
                     Wanted::Contacts => self.contacts(eight, a, *b, &mut found),
                     Wanted::EdgeFace => self.edge_faces(eight, a, *b, &mut found),
@@ -202,13 +244,13 @@ impl EightKernel for Task<'_> {
 }
 
 impl Task<'_> {
-    /// A leaf, and those behind it, whose boxes overlap its own and which the filter lets meet it.
+    /// The leaves numbered `from` or higher whose boxes overlap that of `a` and which the filter lets meet it.
     #[inline(always)]
-    fn list<E: Eight>(&self, eight: E, a: u32, near: &mut Vec<u32>) {
+    fn list<E: Eight>(&self, eight: E, a: u32, from: u32, near: &mut Vec<u32>) {
         let t = self.tree;
         let own = t.tree.components[a as usize];
         let enter = |other: u32| own == MIXED || (self.filter)(t.representative(own), t.representative(other));
-        t.tree.list(eight, &t.leaves[a as usize].query(), a, enter, near);
+        t.tree.list(eight, &t.leaves[a as usize].query(), from, enter, near);
     }
 
     /// Which pairs of primitives of two leaves still have to be asked for: within one component on each side the filter

@@ -121,6 +121,13 @@ impl<const N: usize> LeafBlocks<N> {
         &self.blocks[self.offsets[leaf as usize] as usize..self.offsets[leaf as usize + 1] as usize]
     }
 
+    /// Whether a primitive of the leaf has a vertex for which `woken` says yes.
+    pub fn holds(&self, leaf: u32, woken: &[bool]) -> bool {
+        let of_block =
+            |block: &Block<N>| block.corners.iter().any(|row| row[..block.used].iter().any(|v| woken[*v as usize]));
+        self.leaf(leaf).iter().any(of_block)
+    }
+
     /// New boxes: the unions of the boxes of the vertices. Cost: linear.
     pub fn refit(&mut self, vertices: &[PackedBox], par: Par) {
         par.for_each_block(&mut self.blocks, |_, blocks| blocks.iter_mut().for_each(|block| block.refit(vertices)));

@@ -71,6 +71,23 @@ pub(super) fn merge(lists: PairLists, range: usize, out: &mut Vec<[u32; 2]>, par
     });
 }
 
+/// Adds sorted pairs to sorted pairs, each once. Cost: linear.
+pub(super) fn unite(all: &mut Vec<[u32; 2]>, more: &[[u32; 2]]) {
+    let old = std::mem::take(all);
+    all.reserve(old.len() + more.len());
+    let mut rest = more;
+    for pair in old {
+        let before = rest.iter().take_while(|p| **p < pair).count();
+        all.extend_from_slice(&rest[..before]);
+        rest = &rest[before..];
+        if rest.first() == Some(&pair) {
+            rest = &rest[1..];
+        }
+        all.push(pair);
+    }
+    all.extend_from_slice(rest);
+}
+
 /// Sorts pairs with one first number by their second one.
 #[inline(always)]
 fn sort_by_second(run: &mut [[u32; 2]]) {

@@ -244,3 +244,34 @@ fn hits_are_renewed_as_if_all_were_tested() {
     }
     assert!(renewed_any > 0 && kept_any > 0 && gone_any > 0, "{renewed_any} {kept_any} {gone_any}");
 }
+
+/// Candidates that are kept and widened from motion to motion find what a search from nothing finds.
+#[test]
+fn widened_candidates_miss_nothing() {
+    let mut hits_any = 0;
+    for seed in 1..5 {
+        let (world, end) = scene(seed);
+        let (model, filter) = (&world.model, BodyFilter::new(&world.model));
+        let mut jitter = Jitter(seed + 5);
+        let mut search = CandidateSearch::default();
+        let mut next = end.clone();
+        for round in 0..12 {
+            for x in next.positions.iter_mut() {
+                if jitter.next() > 0.96 {
+                    *x = add(*x, jitter.vector(0.05));
+                }
+            }
+            let found = |search: &mut CandidateSearch| {
+                let x = (&world.state.positions, &next.positions);
+                let passing = Passing::default();
+                let candidates = search.update(model, &filter, x.0, x.1, 2.0, Par::Serial);
+                let near = near_contacts(model, &filter, &passing, candidates, &world.state, &next, 2.0, Par::Serial);
+                (swept_hits(model, &filter, &passing, candidates, &world.state, &next, Par::Serial), near)
+            };
+            let (kept, fresh) = (found(&mut search), found(&mut CandidateSearch::default()));
+            assert!(kept == fresh, "seed {seed} round {round}: {} {}", kept.0.len(), fresh.0.len());
+            hits_any += fresh.0.len();
+        }
+    }
+    assert!(hits_any > 100, "{hits_any}");
+}

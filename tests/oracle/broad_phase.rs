@@ -81,3 +81,48 @@ fn same_candidates_with_the_boxes_of_any_thread_count() {
         assert!(found == expected);
     }
 }
+
+/// Some vertices go farther: what they meet is added, and nothing is listed twice.
+#[test]
+fn what_woken_vertices_meet_is_added() {
+    let mut r = Random::new(31);
+    let pool = Pool::new(3).unwrap();
+    let mut added = 0;
+    for name in ["few", "more", "most"] {
+        let scene = grid(name, 23, 2);
+        let p = scene.primitives();
+        let mut tree = BroadPhase::build(&p);
+        tree.refit(&scene.x0, &scene.x1, &scene.radius, Par::Serial);
+        let between = |a: u32, b: u32| scene.body[a as usize] != scene.body[b as usize];
+        let filters: [&Filter; 2] = [&|_, _| true, &between];
+        let mut kept = [Candidates::default(), Candidates::default()];
+        for (filter, out) in filters.iter().zip(&mut kept) {
+            tree.candidates(filter, out, Par::Serial);
+        }
+        let share = match name {
+            "few" => 0.01,
+            "more" => 0.1,
+            _ => 0.9,
+        };
+        let woken: Vec<bool> = scene.x0.iter().map(|_| r.chance(share)).collect();
+        let mut x1 = scene.x1.clone();
+        for v in (0..x1.len()).filter(|v| woken[*v]) {
+            // Sideways too, where it went straight down: the new box holds the old one.
+            let [a, b, _] = r.vector();
+            x1[v] = signorini::math::add_scaled(x1[v], 0.3, [a, b, 0.0]);
+        }
+        let motion = Motion { x0: &scene.x0, x1: &x1, radius: &scene.radius };
+        let boxes: Vec<_> = (0..x1.len() as u32).map(|v| motion.vertex_box(v)).collect();
+        tree.refit_to(&boxes, Par::Serial);
+        for (filter, out) in filters.iter().zip(&mut kept) {
+            let before = out.clone();
+            let (mut serial, mut pooled) = (out.clone(), out.clone());
+            tree.add_candidates(&woken, filter, &mut serial, Par::Serial);
+            tree.add_candidates(&woken, filter, &mut pooled, Par::Pool(&pool));
+            let expected = brute_force::candidates(&p, &motion, filter);
+            assert!(serial == expected && pooled == expected, "{name}");
+            added += serial.edge_edge.len() - before.edge_edge.len();
+        }
+    }
+    assert!(added > 100, "{added}");
+}

@@ -49,6 +49,26 @@ fn jitter_and_threads() {
     assert_ne!(hash(&["--jitter", "4"]), hash(&["--jitter", "3"]));
 }
 
+/// The velocity filter by its name: another motion, as clean, and resumed with the same bits; the method is part of the run.
+#[test]
+fn the_filter_runs_and_goes_on_with_the_same_bits() {
+    let folder = Folder::new("filter");
+    folder.file("scene.toml", &SMALL.replace("[output]", "[settings]\nrestitution = 0.4\n\n[output]"));
+    let filter = ["scene.toml", "--method", "filter"];
+    let run = |more: &[&str]| report(&folder, &[&filter[..], more].concat());
+    let whole = run(&[]);
+    assert_eq!((whole["method"].as_str(), whole["intersections"].as_u64()), (Some("filter"), Some(0)));
+    assert!(whole["contacts_max"].as_u64() > Some(10), "{whole}");
+    assert_ne!(whole["hash"], report(&folder, &["scene.toml"])["hash"]);
+    run(&["--out", "half", "--steps", "17"]);
+    assert_eq!(run(&["--resume", "half/last.snapshot", "--threads", "2"])["hash"], whole["hash"]);
+    let output = crate::command::run(&folder, &["scene.toml", "--resume", "half/last.snapshot"]);
+    assert!(text(&output.stderr).contains("another scene file, method"), "{}", text(&output.stderr));
+    folder.file("bad.toml", &SMALL.replace("[output]", "[settings]\nrestitution = 1.4\n\n[output]"));
+    let output = crate::command::run(&folder, &["bad.toml"]);
+    assert!(text(&output.stderr).contains("settings.restitution"), "{}", text(&output.stderr));
+}
+
 #[test]
 fn an_interrupt_leaves_a_snapshot_to_go_on_from() {
     let folder = Folder::new("interrupt");
