@@ -7,8 +7,17 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// Rank cut: directions whose singular value is below this share of the largest one are left out. Rows are unit vectors.
 pub(super) const RANK_CUT: f64 = 1e-6;
 
-/// Rows up to which matrices are dense and the spectrum is computed; more are solved by bidiagonalisation.
+/// Rows up to which matrices are dense and the spectrum is computed.
 pub(super) const DENSE_ROWS: usize = 128;
+
+/// Rows up to which `A A^T` is factored; more are solved by bidiagonalisation.
+const FACTORED_ROWS: usize = 800;
+
+/// Solves with the factor, each from what the last one left.
+const REFINEMENTS: usize = 6;
+
+/// Multipliers beyond this multiple of the right side tell that the equations contradict each other.
+const LARGEST_MULTIPLIER: f64 = 1e9;
 
 /// Bidiagonalisations at most, each from what the last one left: orthogonality that rounding took is made anew.
 const RESTARTS: usize = 3;
@@ -23,18 +32,24 @@ const TOLERANCE: f64 = 1e-13;
 pub(super) struct MinimumNorm {
     pub y: Vec<Vec3>,
     pub multipliers: Vec<f64>,
-    /// Directions used; by bidiagonalisation, its steps.
+    /// Directions used; of a factor all rows, of bidiagonalisation its steps.
     pub rank: usize,
 }
 
 /// The least-squares solution of `A y = r` of smallest norm, at the rank cut.
 ///
-/// Few rows: by the eigenvectors of `A A^T`, refined once. Many: by the bidiagonalisation of Golub and Kahan in the form
+/// Few rows: by the eigenvectors of `A A^T`, refined once. More: by a factor of `A A^T` with the square of the cut on its
+/// diagonal, refined: directions below the cut fade out. Many, or such as contradict each other: by the bidiagonalisation of Golub and Kahan in the form
 /// of Paige and Saunders, at most three times four steps a row; there the cut is what that many steps do not reach. Cost:
 /// cubic in few rows, else linear in entries times steps.
 pub(super) fn minimum_norm(rows: &ZoneRows, right: &[f64]) -> MinimumNorm {
     if rows.len() <= DENSE_ROWS
         && let Some(solution) = by_spectrum(rows, right)
+    {
+        return solution;
+    }
+    if rows.len() <= FACTORED_ROWS
+        && let Some(solution) = by_factor(rows, right)
     {
         return solution;
     }
@@ -70,6 +85,33 @@ fn by_spectrum(rows: &ZoneRows, right: &[f64]) -> Option<MinimumNorm> {
     lambda += solve(&left);
     let y = rows.transposed_product(lambda.as_slice());
     Some(MinimumNorm { y, multipliers: lambda.as_slice().to_vec(), rank: kept.len() })
+}
+
+/// Iterated Tikhonov regularisation; `None` where the equations contradict each other.
+fn by_factor(rows: &ZoneRows, right: &[f64]) -> Option<MinimumNorm> {
+    let n = rows.len();
+    let mut matrix = DMatrix::zeros(n, n);
+    for j in 0..n {
+        for i in j..n {
+            matrix[(i, j)] = rows.inner_product(i, j);
+        }
+    }
+    let sum = |j: usize| (0..n).map(|i| matrix[(i.max(j), i.min(j))].abs()).sum::<f64>();
+    let bound = (0..n).map(sum).fold(0.0, f64::max);
+    // The largest sum of a row bounds the largest eigenvalue.
+    (0..n).for_each(|i| matrix[(i, i)] += RANK_CUT * RANK_CUT * bound);
+    let factor = matrix.cholesky()?;
+    let largest = right.iter().fold(0.0_f64, |m, r| m.max(r.abs()));
+    let mut lambda = DVector::<f64>::zeros(n);
+    for _ in 0..REFINEMENTS {
+        let y = rows.transposed_product(lambda.as_slice());
+        lambda += factor.solve(&DVector::from_fn(n, |i, _| right[i] - rows.product(i, &y)));
+    }
+    if !lambda.iter().all(|l| l.abs() <= LARGEST_MULTIPLIER * largest) {
+        return None;
+    }
+    let y = rows.transposed_product(lambda.as_slice());
+    Some(MinimumNorm { y, multipliers: lambda.as_slice().to_vec(), rank: n })
 }
 
 /// LSQR, which also keeps each direction's multipliers.

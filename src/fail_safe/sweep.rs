@@ -1,6 +1,6 @@
 //! Continuous detection as a fail-safe sees it: velocities in, hits out.
 
-use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing, swept_hits};
+use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing, renewed_hits, swept_hits};
 use crate::math::Vec3;
 use crate::model::{Segment, State};
 use crate::parallel::Par;
@@ -28,6 +28,23 @@ impl Sweep<'_> {
         let (model, par) = (self.segment.model, self.par);
         let found = candidates.update(model, self.filter, &start.positions, &end.positions, self.factor, par);
         let hits = swept_hits(model, self.filter, self.passing, found, start, &end, par);
+        (end, hits)
+    }
+
+    /// [`Sweep::test`] of the whole segment where the hits of another end are known: what ends where it ended is not tested
+    /// again. The same hits.
+    pub fn test_again(
+        &self,
+        velocities: &[Vec3],
+        (known, hits): (&State, &[Hit]),
+        candidates: &mut CandidateSearch,
+    ) -> (State, Vec<Hit>) {
+        let mut end = State::default();
+        self.segment.end_state(velocities, 1.0, true, &mut end);
+        let (start, model, par) = (self.segment.start, self.segment.model, self.par);
+        let moved: Vec<bool> = end.positions.iter().zip(&known.positions).map(|(a, b)| a != b).collect();
+        let found = candidates.update(model, self.filter, &start.positions, &end.positions, self.factor, par);
+        let hits = renewed_hits(model, self.filter, self.passing, found, (start, &end), hits, &moved, par);
         (end, hits)
     }
 }

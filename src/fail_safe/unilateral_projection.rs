@@ -43,8 +43,6 @@ const HALVINGS: usize = 30;
 pub(super) struct Unilateral {
     pub y: Vec<Vec3>,
     pub multipliers: Vec<f64>,
-    /// Rows that push.
-    pub active: usize,
     pub converged: bool,
 }
 
@@ -121,7 +119,7 @@ fn polished(rows: &ZoneRows, demand: &[f64], lambda: &[f64], size: f64) -> Optio
             multipliers.fill(0.0);
             active.iter().zip(&solution.multipliers).for_each(|(i, l)| multipliers[*i] = l.max(0.0));
         }
-        return Some(Unilateral { y: solution.y, multipliers, active: active.len(), converged: true });
+        return Some(Unilateral { y: solution.y, multipliers, converged: true });
     }
     None
 }
@@ -188,8 +186,7 @@ impl Multipliers {
     }
 
     fn finished(self, rows: &ZoneRows, converged: bool) -> Unilateral {
-        let active = self.lambda.iter().filter(|l| **l > 0.0).count();
-        Unilateral { y: rows.transposed_product(&self.lambda), multipliers: self.lambda, active, converged }
+        Unilateral { y: rows.transposed_product(&self.lambda), multipliers: self.lambda, converged }
     }
 }
 

@@ -77,6 +77,9 @@ pub fn project_zone(
         }
         _ => {}
     }
+    if zone.unilateral {
+        zone.result.rank = zone.result.normal_impulses.iter().filter(|impulse| **impulse > 0.0).count();
+    }
     zone.result.residual = zone.residual();
     blocks.add_to(&zone.y, velocities);
     zone.result
@@ -100,7 +103,7 @@ impl Zone {
             (0..self.demand.len()).map(|i| self.demand[i] - self.normals.product(i, &self.y)).collect();
         let (y, multipliers) = if self.unilateral {
             let solution = unilateral(&self.normals, &left);
-            (self.result.rank, self.result.converged) = (solution.active, solution.converged);
+            self.result.converged = solution.converged;
             (solution.y, solution.multipliers)
         } else {
             let solution = minimum_norm(&self.normals, &left);

@@ -20,6 +20,10 @@ const ROUNDS: usize = 22;
 /// Rows that a pair may own in a projected zone. One that is hit once more makes its zone rigid.
 const ROWS_OF_PAIR: u32 = 4;
 
+/// Share of their gaps that rows ask for where the whole leaves no solution: above the half that continuous detection
+/// keeps.
+const SQUEEZED: f64 = 0.6;
+
 /// How often a zone with rigid bodies is projected in a round, each time about the motion found last.
 const LINEARISATIONS: usize = 3;
 
@@ -69,7 +73,7 @@ pub struct ZoneOutcome {
 /// be done.
 ///
 /// Collisions that share a movable node are in one zone; those that share only a scripted one are not. Projected motion
-/// is tested by continuous detection like any other: a pair that is hit again owns another row, at its new impact. After
+/// is tested by continuous detection like any other (where thickness leaves no solution, 0.6 of it is asked for): a pair that is hit again owns another row, at its new impact. After
 /// 12 rounds, or when a pair is hit a fifth time or a projection finds no solution, its zone moves as a rigid body. A pair of scripted parts ends it at once.
 /// Cost: at most 22 rounds, each of continuous detection and of the zones that were hit.
 pub fn resolve_zones(
@@ -94,7 +98,10 @@ pub fn resolve_zones(
         let failed = |zone: &&Zone| reports.get(&zone.root).is_some_and(|report| !report.converged);
         touched.iter().filter(failed).for_each(|zone| zones.rigid[zone.root] = true);
         outcome.rounds += 1;
-        (outcome.end, outcome.hits) = sweep.test(&outcome.velocities, 1.0, candidates);
+        (outcome.end, outcome.hits) = match outcome.rounds {
+            1 => sweep.test(&outcome.velocities, 1.0, candidates),
+            _ => sweep.test_again(&outcome.velocities, (&outcome.end, &outcome.hits), candidates),
+        };
         if outcome.hits.is_empty() {
             break;
         }
@@ -156,7 +163,7 @@ fn answer(
         segment.end_state(velocities, 1.0, false, &mut end);
         let (start, dt) = (segment.start, segment.dt);
         let about = Linearisation { start, end: &end, velocities, unconstrained: tentative, dt };
-        let built = build_rows(segment.model, metric, &contacts, &gaps, &frames, &about);
+        let mut built = build_rows(segment.model, metric, &contacts, &gaps, &frames, &about);
         let mut first = 0;
         for zone in &projected {
             let last = first + zone.contacts.len() as u32;
@@ -164,7 +171,16 @@ fn answer(
             let of: Vec<usize> = (row(first)..row(last)).collect();
             first = last;
             reset(nodes, zone, tentative, velocities);
-            let projection = project_zone(&built.rows, &of, metric, response, velocities);
+            let mut projection = project_zone(&built.rows, &of, metric, response, velocities);
+            if !projection.converged && response.fail_safe == FailSafe::UnilateralProjection {
+                // Thickness gives way first.
+                for row in &of {
+                    let gap = gaps[built.contact[*row] as usize];
+                    built.rows.normal_targets[*row] -= (1.0 - SQUEEZED) * gap / dt;
+                }
+                reset(nodes, zone, tentative, velocities);
+                projection = project_zone(&built.rows, &of, metric, response, velocities);
+            }
             let mut report = report_of(zone, response.fail_safe);
             report.rank = projection.rank as u32;
             (report.residual, report.converged) = (projection.residual, projection.converged);

@@ -5,8 +5,8 @@ use super::surface::{Topology, surface};
 use super::{Fault, WorldError};
 use crate::math::{Vec3, add, is_finite, scale, sub};
 use crate::model::{
-    BodyDescription, Drives, Kind, Material, Materials, Model, Precision, Settings, State, StepError, StepReport,
-    StepResult, Surface, Watch, Witness,
+    BodyDescription, Drives, FilterSettings, Kind, Material, Materials, Model, Precision, Settings, State, StepError,
+    StepReport, StepResult, Surface, Watch, Witness,
 };
 use crate::parallel::Par;
 use crate::velocity_filter;
@@ -43,8 +43,9 @@ pub enum Motion<'a> {
     /// The filter's own state moves by the displacement between these two: a recorded trajectory whose filtered copy keeps
     /// what contact changed. The first call starts at the first positions.
     Displacement(&'a [Vec3], &'a [Vec3]),
-    /// The filter's own state moves towards these: a recorded trajectory that is followed as closely as contact lets.
-    /// Errors: no call before that gave a state.
+    /// The filter's own state moves towards these: a recorded trajectory that is followed as closely as contact lets. Every
+    /// call projects at once, without springs and passes of impulses: these push and never take back, and what they push
+    /// too far would be wished back the faster in the next call. Errors: no call before that gave a state.
     Towards(&'a [Vec3]),
 }
 
@@ -208,12 +209,16 @@ impl MotionFilter {
             }
         }
         let before = state.positions.clone();
+        let mut settings = *settings;
+        if matches!(motion, Motion::Towards(_)) {
+            settings.filter = FilterSettings { passes_max: 0, repulsion_stiffness: 0.0, ..settings.filter };
+        }
         let outcome = velocity_filter::advance_watched(
             &self.model,
             &mut state,
             &self.drives,
             &mut self.memory,
-            settings,
+            &settings,
             dt,
             &mut self.result,
             &mut self.scratch,

@@ -38,7 +38,7 @@ fn a_recorded_cloth_is_kept_above_a_roof() {
     let text = run("examples/c/filter.c", Standard::C99, &[]);
     assert_eq!(text.lines().count(), 6, "{text}");
     assert!(text.lines().all(|line| line.ends_with(" 0 intersections")), "{text}");
-    assert!(text.contains("recorded 0.300, filtered 0.5"), "{text}");
+    assert!(text.contains("frame 15: recorded 0.300, filtered 0.5"), "{text}");
 }
 
 #[test]

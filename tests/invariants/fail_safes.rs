@@ -3,9 +3,9 @@
 use crate::world::*;
 use signorini::constraint::Metric;
 use signorini::contact_search::{BodyFilter, CandidateSearch, Passing, intersections};
-use signorini::fail_safe::{Sweep, hold};
+use signorini::fail_safe::{Sweep, ZoneOutcome, ZoneResponse, hold, resolve_zones};
 use signorini::math::{norm, sub};
-use signorini::model::{FailSafe, Segment, StepError};
+use signorini::model::{FailSafe, Segment, StepError, ZoneFriction};
 use signorini::parallel::Par;
 
 fn crude(world: &mut World) {
@@ -159,4 +159,121 @@ fn holding_grows_until_nothing_is_hit_and_held_parts_keep_their_bits() {
     assert!(outcome.end.positions[aside][2] > world.state.positions[aside][2] + 0.07, "what is free moves on");
     let found = intersections(&world.model, &filter, &outcome.end, Par::Serial);
     assert!(found.witnesses.is_empty());
+}
+
+/// Zones of the first step of a prepared world, from its unconstrained velocities.
+fn zones_of(world: &World, fail_safe: FailSafe, friction: ZoneFriction) -> ZoneOutcome {
+    let (filter, passing) = (BodyFilter::new(&world.model), Passing::default());
+    let (start, drives) = (&world.state, &world.drives);
+    let segment = Segment { model: &world.model, drives, step_start: start, start, from: 0.0, to: 1.0, dt: world.dt };
+    let sweep = Sweep { segment, filter: &filter, passing: &passing, factor: 1.0, par: Par::Serial };
+    let metric = Metric::new(&world.model, start, drives).unwrap();
+    let mut candidates = CandidateSearch::default();
+    let (_, hits) = sweep.test(&drives.velocities, 1.0, &mut candidates);
+    assert!(!hits.is_empty(), "nothing collides");
+    let response = ZoneResponse { fail_safe, friction };
+    let outcome = resolve_zones(&sweep, &metric, &drives.velocities, &hits, &mut candidates, &response);
+    let (_, left) = sweep.test(&outcome.velocities, 1.0, &mut candidates);
+    assert_eq!(left, outcome.hits, "what is tested again is what a whole test finds");
+    outcome
+}
+
+/// Two pairs of sheets that fly at each other, far apart.
+fn two_pairs(seed: u64) -> World {
+    let mut jitter = Jitter(seed);
+    let mut plan = Plan::rubbing(0.3);
+    let cloth = sheet(7, 0.3);
+    for x in [0.0, 2.0] {
+        plan.cloth(&cloth, moved(&cloth, [x, 0.0, 0.0], &mut jitter, 0.002), 0.1, &[], [0.3, 0.0, 6.0]);
+        plan.cloth(&cloth, moved(&cloth, [x + 0.01, 0.02, 0.03], &mut jitter, 0.002), 0.3, &[], [0.0, 0.2, -6.0]);
+    }
+    plan.build()
+}
+
+#[test]
+fn each_zone_keeps_its_momentum_and_rigid_ones_their_angular_momentum() {
+    for seed in 1..5 {
+        for fail_safe in [FailSafe::UnilateralProjection, FailSafe::InelasticProjection, FailSafe::RigidZone] {
+            for friction in [ZoneFriction::PerContact, ZoneFriction::PerZone] {
+                let mut world = two_pairs(seed);
+                world.prepare();
+                let outcome = zones_of(&world, fail_safe, friction);
+                let what = format!("seed {seed} {fail_safe:?} {friction:?}: {:?}", outcome.reports);
+                assert!(outcome.hits.is_empty() && outcome.reports.len() >= 2, "{what}");
+                let old = &world.drives.velocities;
+                // Sheets 1 and 2 share no zone with 3 and 4.
+                for pair in [[1, 2], [3, 4]] {
+                    let (mut change, mut size, mut energy) = ([0.0; 3], 0.0, 0.0);
+                    for key in pair {
+                        let body = world.body(key);
+                        let signorini::model::Kind::Deformable { masses, .. } = &body.description.kind else {
+                            panic!()
+                        };
+                        for (block, m) in body.blocks.clone().zip(masses) {
+                            let (new, old) = (outcome.velocities[block], old[block]);
+                            change = signorini::math::add_scaled(change, *m, sub(new, old));
+                            size += m * norm(old);
+                            energy += m * (norm(new).powi(2) - norm(old).powi(2));
+                        }
+                    }
+                    assert!(norm(change) < 1e-12 * size, "{what}: {:e}", norm(change) / size);
+                    assert!(energy <= 1e-12 * size, "{what}: {energy:e}");
+                }
+                for report in &outcome.reports {
+                    let angular = norm(report.angular_momentum_change);
+                    if report.fail_safe == FailSafe::RigidZone {
+                        assert!(angular < 1e-13, "{what}");
+                        assert_eq!(report.residual, 0.0, "{what}");
+                    } else {
+                        // Normals at impact are not those at the start: an error, which is reported.
+                        assert!(angular > 0.0 && angular < 0.05 && report.converged, "{what}");
+                        assert!(report.residual < 1e-6 && report.rank > 0, "{what}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn rigid_zones_break_down_between_scripts_that_disagree_where_projections_do_not() {
+    // Two scripted plates slide past each other, a cloth between them touches both.
+    let between = |fail_safe| {
+        let mut plan = Plan::rubbing(0.0);
+        let cloth = sheet(8, 0.3);
+        plan.cloth(&cloth, moved(&cloth, [0.0; 3], &mut Jitter(2), 1e-4), 0.1, &[], [0.0, 0.0, 0.09]);
+        let upper = plan.scripted(&block([0.5, 0.5, 0.02]), at([0.0, 0.003, 0.018]));
+        let lower = plan.scripted(&block([0.5, 0.5, 0.02]), at([0.002, 0.0, -0.018]));
+        let mut world = plan.build();
+        world.prepare();
+        for (key, x) in [(upper, 0.02), (lower, -0.02)] {
+            let mut pose = world.pose(key);
+            pose.position[0] += x;
+            pose.position[2] -= x.signum() * 0.0067;
+            world.script(key, pose);
+        }
+        zones_of(&world, fail_safe, ZoneFriction::Frictionless)
+    };
+    let rigid = between(FailSafe::RigidZone);
+    let misfit = rigid.reports.iter().map(|r| r.residual).fold(0.0, f64::max);
+    assert!(misfit > 1.0 && !rigid.hits.is_empty(), "misfit {misfit} m/s, {} hits left", rigid.hits.len());
+    let projected = between(FailSafe::UnilateralProjection);
+    assert!(projected.hits.is_empty() && projected.rigid == 0, "{:?}", projected.reports);
+}
+
+#[test]
+fn zones_that_share_a_script_only_are_apart() {
+    let mut plan = Plan::rubbing(0.0);
+    let cloth = sheet(4, 0.2);
+    for x in [-0.5, 0.5] {
+        plan.cloth(&cloth, moved(&cloth, [x, 0.0, 0.05], &mut Jitter(1), 0.001), 0.1, &[], [0.0, 0.0, -9.0]);
+    }
+    plan.half_space([0.0, 0.0, 1.0], 0.0);
+    for (fail_safe, count) in [(FailSafe::UnilateralProjection, 32), (FailSafe::RigidZone, 32)] {
+        let mut world = plan.clone().build();
+        world.prepare();
+        let outcome = zones_of(&world, fail_safe, ZoneFriction::Frictionless);
+        assert_eq!(outcome.reports.len(), count, "every vertex strikes the ground on its own: {:?}", outcome.reports);
+        assert!(outcome.hits.is_empty() && outcome.reports.iter().all(|r| r.scripted == 1 && r.nodes == 1));
+    }
 }

@@ -170,12 +170,21 @@ fn position_mode_comes_back_to_what_was_recorded() {
     let mut filter = mesh.filter(Precision::Double);
     let mut worst = 0.0_f64;
     for (i, pair) in frames.windows(2).enumerate() {
-        if i == 0 {
-            run(&mut filter, Motion::Between(&pair[0], &pair[1]));
+        let before = if i == 0 { pair[0].clone() } else { filter.positions() };
+        let report = if i == 0 {
+            run(&mut filter, Motion::Between(&pair[0], &pair[1]))
         } else {
-            run(&mut filter, Motion::Towards(&pair[1]));
-        }
+            run(&mut filter, Motion::Towards(&pair[1]))
+        };
         let end = filter.positions();
+        // What stands still takes energy only: that of the wish is never surpassed but by thickness regained.
+        let energy = |v: &dyn Fn(usize) -> Vec3| sheet.clone().map(|i| 1e-3 * norm(v(i)).powi(2)).sum::<f64>();
+        let wished = energy(&|i| scale(1.0 / DT, sub(pair[1][i], before[i])));
+        let found = energy(&|i| filter.velocities()[i]);
+        assert!(found <= wished * (1.0 + 1e-9) + report.recovery_work, "frame {i}: {wished} J -> {found} J");
+        // It follows as closely as it can: nothing is pushed higher than it must, frame after frame.
+        let height = |x: &[Vec3]| sheet.clone().map(|v| x[v][2]).fold(-1.0, f64::max);
+        assert!(height(&end) < height(&pair[1]).max(0.125) + 0.01, "frame {i}: {}", height(&end));
         assert_eq!(mesh.intersections(&end), 0);
         worst = end.iter().zip(&pair[1]).map(|(a, b)| norm(sub(*a, *b))).fold(worst, f64::max);
         if i + 2 == frames.len() {

@@ -58,7 +58,7 @@ pub fn sheet(n: usize, size: f64) -> Triangles {
 }
 
 /// Bodies before the world is built.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Plan {
     bodies: Vec<BodyDescription>,
     placed: Vec<(u64, Option<Pose>, Option<Vec<Vec3>>)>,
