@@ -181,7 +181,7 @@ fn dantzig(matrix: &DMatrix<f64>, demand: &DVector<f64>) -> Option<DVector<f64>>
             // One more unit at the row, the pushing ones balanced.
             let own = DMatrix::from_fn(pushing.len(), pushing.len(), |i, j| matrix[(pushing[i], pushing[j])]);
             let against = DVector::from_fn(pushing.len(), |i, _| -matrix[(pushing[i], row)]);
-            let balance = own.lu().solve(&against)?;
+            let balance = if pushing.is_empty() { against } else { own.lu().solve(&against)? };
             let mut change = DVector::zeros(k);
             change[row] = 1.0;
             pushing.iter().enumerate().for_each(|(i, p)| change[*p] = balance[i]);

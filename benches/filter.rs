@@ -3,7 +3,8 @@
 //! `cargo bench --bench filter`: processor milliseconds of a call on one thread, start check and certificate included, the
 //! tree kept from call to call; the best of the calls after the first. A share of a flat cloth is sent through scripted
 //! cloth right below it, the rest freely down; everything drifts, so that no box of the call before holds.
-//! Words: `quick` (to 1e4 vertices), `inelastic`, `rigid`, `vertices=N share=S` for one scene, 40 calls.
+//! Words: `quick` (to 1e4 vertices), `recorded` (displacement mode: the start is known to be clean), `projections` (no
+//! passes of impulses), `inelastic`, `rigid`, `vertices=N share=S` for one scene, 40 calls.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 #[allow(dead_code, unused_imports)]
@@ -58,7 +59,7 @@ fn scene(count: usize, share: f64) -> Scene {
 }
 
 /// Seconds of the best call, and its report.
-fn measure(scene: &Scene, settings: &Settings, calls: usize) -> (f64, StepReport) {
+fn measure(scene: &Scene, settings: &Settings, calls: usize, recorded: bool) -> (f64, StepReport) {
     let mut filter = MotionFilter::new(MotionFilterDescription {
         rest: scene.x.clone(),
         topology: Topology { triangles: scene.triangles.clone(), ..Topology::default() },
@@ -77,7 +78,8 @@ fn measure(scene: &Scene, settings: &Settings, calls: usize) -> (f64, StepReport
         let x0: Vec<Vec3> = scene.x.iter().map(|x| add(*x, drift)).collect();
         let x1: Vec<Vec3> = x0.iter().zip(&scene.way).map(|(x, w)| add(*x, *w)).collect();
         let from = thread_seconds();
-        let report = filter.run(Motion::Between(&x0, &x1), settings, DT, Par::Serial, Watch::default());
+        let motion = if recorded { Motion::Displacement(&x0, &x1) } else { Motion::Between(&x0, &x1) };
+        let report = filter.run(motion, settings, DT, Par::Serial, Watch::default());
         seconds.push(thread_seconds() - from);
         let report = report.unwrap_or_else(|failure| panic!("{:?}", failure.error));
         assert_eq!(report.intersections, Some(0));
@@ -99,13 +101,16 @@ fn main() {
     } else {
         FailSafe::UnilateralProjection
     };
-    let settings = Settings { certify: true, fail_safe, ..Settings::default() };
+    let mut settings = Settings { certify: true, fail_safe, ..Settings::default() };
+    if has("projections") {
+        settings.filter.passes_max = 0;
+    }
     println!(
         "vertices,share,milliseconds,contacts,active,passes,projected,rigid,held,start+certificate,search,detection,response,fail_safe"
     );
     let number = |name: &str| words.iter().find_map(|w| w.strip_prefix(name)?.parse::<f64>().ok());
     if let (Some(count), Some(share)) = (number("vertices="), number("share=")) {
-        let (seconds, report) = measure(&scene(count as usize, share), &settings, 40);
+        let (seconds, report) = measure(&scene(count as usize, share), &settings, 40, has("recorded"));
         println!("{:.2} ms of the processor, {:?}", 1e3 * seconds, report);
         return;
     }
@@ -115,7 +120,7 @@ fn main() {
         let mut line = (0, 0.0);
         for count in counts {
             let scene = scene(*count, share);
-            let (seconds, r) = measure(&scene, &settings, if *count > 50_000 { 4 } else { 10 });
+            let (seconds, r) = measure(&scene, &settings, if *count > 50_000 { 4 } else { 10 }, has("recorded"));
             let ms = |microseconds: f64| 1e-3 * microseconds;
             println!(
                 "{},{share},{:.2},{},{},{},{},{},{},{:.1},{:.1},{:.1},{:.1},{:.1}",
