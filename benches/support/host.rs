@@ -234,7 +234,7 @@ impl Host {
     }
 
     /// `|v|_A^2 / 2` over all free blocks.
-    fn metric_energy(&self, linear: &LinearStep, v: &[Vec3]) -> f64 {
+    pub fn metric_energy(&self, linear: &LinearStep, v: &[Vec3]) -> f64 {
         let n = self.elastic_count();
         let mut av = vec![[0.0; 3]; n];
         linear.matrix.product(&v[..n], &mut av, Par::Serial);

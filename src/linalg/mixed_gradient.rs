@@ -1,9 +1,7 @@
-//! Preconditioned conjugate gradients in single precision on increments from an iterate that is renewed in double
-//! precision: the memory traffic of single precision, the accuracy of double. The preconditioner is the inverse diagonal
-//! blocks.
+//! Conjugate gradients in single precision on increments from an iterate that is renewed in double precision: the memory
+//! traffic of single precision, the accuracy of double.
 
-use super::{BlockMatrix, GradientEnding, SinglePrecision, power_of_two};
-use crate::math::simd::{Kernel, Quad, run_wide};
+use super::{BlockMatrix, GradientEnding, SweepGradient, power_of_two};
 use crate::math::{Mat3, Vec3, ZERO_MATRIX, add, dot, inverse, mat_vec, sub};
 use crate::parallel::Par;
 
@@ -11,27 +9,18 @@ use crate::parallel::Par;
 /// meantime stays far below it.
 const RENEWAL: f64 = 1e-5;
 
+/// Share of the wanted fall that is left to the difference of the two norms.
+const SAFETY: f64 = 0.5;
+
 /// A renewal that has not taken this share off the squared residual found rounding, not progress.
 const PROGRESS: f64 = 0.5;
-
-/// Residual, its image under the inverse diagonal and the increment of one block.
-#[derive(Clone, Copy, Debug, Default)]
-struct Node {
-    residual: Quad,
-    scaled: Quad,
-    change: Quad,
-}
 
 /// Buffers; capacity only.
 #[derive(Clone, Debug, Default)]
 pub struct MixedGradient {
-    matrix: SinglePrecision,
+    sweep: SweepGradient,
     exact_inverse: Vec<Mat3>,
-    inverse: Vec<[Quad; 3]>,
     exact: Vec<Vec3>,
-    nodes: Vec<Node>,
-    direction: Vec<Quad>,
-    image: Vec<Quad>,
 }
 
 impl MixedGradient {
@@ -39,21 +28,15 @@ impl MixedGradient {
     ///
     /// Cost: a pass over the blocks.
     pub fn prepare(&mut self, matrix: &BlockMatrix, fixed: &[bool], par: Par) {
-        self.matrix.assign(matrix);
+        self.sweep.assign(matrix, |i| fixed[i]);
         let n = fixed.len();
         self.exact_inverse.resize(n, ZERO_MATRIX);
         par.map_into(&mut self.exact_inverse, |i| {
             if fixed[i] { ZERO_MATRIX } else { inverse(matrix.diagonal_block(i)).unwrap_or(ZERO_MATRIX) }
         });
-        self.inverse.resize(n, [Quad::default(); 3]);
-        let (exact, mass) = (&self.exact_inverse, self.matrix.unit());
-        par.map_into(&mut self.inverse, |i| {
-            [0, 1, 2].map(|c| Quad::round([exact[i][0][c], exact[i][1][c], exact[i][2][c]], mass))
-        });
+        let exact = &self.exact_inverse;
+        self.sweep.set_inverse(|i| exact[i], par);
         self.exact.resize(n, [0.0; 3]);
-        self.nodes.resize(n, Node::default());
-        self.direction.resize(n, Quad::default());
-        self.image.resize(n, Quad::default());
     }
 
     /// `|b - A x|^2` in the norm of the inverse diagonal blocks, over the rows that are not fixed.
@@ -78,8 +61,10 @@ impl MixedGradient {
         (target, steps_max): (f64, u32),
         par: Par,
     ) -> (u32, GradientEnding) {
-        let (mut steps, mut last, mut beta, mut old) = (0, f64::INFINITY, 0.0, (0.0, 1.0));
-        self.direction.fill(Quad::default());
+        let (mut steps, mut last, mut beta, mut unit) = (0, f64::INFINITY, 0.0, 1.0);
+        // The squared residual before the last step.
+        let mut before = 0.0;
+        self.sweep.forget();
         loop {
             let square = self.residual_squared(matrix, b, x, par);
             if square <= target {
@@ -92,143 +77,40 @@ impl MixedGradient {
                 return (steps, GradientEnding::Capped);
             }
             last = square;
-            let unit = power_of_two(self.exact.iter().flatten().fold(0.0, |m: f64, f| m.max(f.abs())));
-            let mut rho = self.renew(unit, par);
-            if old.0 > 0.0 {
+            let old = unit;
+            unit = power_of_two(self.exact.iter().flatten().fold(0.0, |m: f64, f| m.max(f.abs())));
+            let exact = &self.exact;
+            let mut rho = self.sweep.begin(|i| exact[i], unit, par);
+            if before > 0.0 {
                 // The direction goes on, in the new unit.
-                beta = rho / old.0 * (unit / old.1);
+                beta = rho / before * (unit / old);
             }
-            let enough = (0.5 * target).max(RENEWAL * square) / (unit * unit / self.matrix.unit());
+            // The norm of the sweep falls about as that of the diagonal does.
+            let enough = (SAFETY * target / square).max(RENEWAL) * rho;
             let mut sound = true;
             while sound {
-                let curvature = self.turn(beta as f32, par);
+                let curvature = self.sweep.turn(beta as f32, &mut (), par);
                 sound = curvature > 0.0 && rho.is_finite();
                 if sound {
-                    let next = self.descend((rho / curvature) as f32, par);
+                    let next = self.sweep.descend((rho / curvature) as f32, par);
                     steps += 1;
                     beta = next / rho;
-                    rho = next;
+                    (before, rho) = (rho, next);
                     if rho <= enough || steps >= steps_max {
                         break;
                     }
                 }
             }
-            let (nodes, up) = (&self.nodes, unit / self.matrix.unit());
+            let (sweep, up) = (&self.sweep, unit / self.sweep.unit());
             par.for_each_block(x, |start, x| {
                 for (i, x) in x.iter_mut().enumerate() {
-                    *x = add(*x, nodes[start + i].change.widen(up));
+                    *x = add(*x, sweep.change(start + i).widen(up));
                 }
             });
-            old = (rho, unit);
             if !sound {
                 return (steps, GradientEnding::Breakdown);
             }
         }
-    }
-
-    /// Takes over the exact residual, in a unit of impulse; returns its square.
-    fn renew(&mut self, unit: f64, par: Par) -> f64 {
-        let (exact, inverse) = (&self.exact, &self.inverse);
-        par.update_and_sum(&mut self.nodes, |s, nodes| {
-            run_wide(Renew { nodes, exact: &exact[s..], inverse: &inverse[s..], unit: 1.0 / unit })
-        })
-    }
-
-    /// The next direction `d = z + beta d` and its image; returns `d · A d`.
-    fn turn(&mut self, beta: f32, par: Par) -> f64 {
-        let nodes = &self.nodes;
-        par.for_each_block(&mut self.direction, |s, d| run_wide(Turn { d, nodes: &nodes[s..], beta }));
-        let (matrix, d) = (&self.matrix, &self.direction);
-        par.update_and_sum(&mut self.image, |start, out| run_wide(Image { matrix, d, start, out }))
-    }
-
-    /// A step of `alpha` along the direction; returns the squared residual.
-    fn descend(&mut self, alpha: f32, par: Par) -> f64 {
-        let (inverse, image, d) = (&self.inverse, &self.image, &self.direction);
-        par.update_and_sum(&mut self.nodes, |s, nodes| {
-            run_wide(Descend { nodes, inverse: &inverse[s..], image: &image[s..], d: &d[s..], alpha })
-        })
-    }
-}
-
-struct Renew<'a> {
-    nodes: &'a mut [Node],
-    exact: &'a [Vec3],
-    inverse: &'a [[Quad; 3]],
-    unit: f64,
-}
-
-impl Kernel for Renew<'_> {
-    type Output = f64;
-    #[inline(always)]
-    fn run(self) -> f64 {
-        let mut sum = Quad::default();
-        for ((node, f), inverse) in self.nodes.iter_mut().zip(self.exact).zip(self.inverse) {
-            let residual = Quad::round(*f, self.unit);
-            let scaled = Quad::combine(inverse, residual);
-            *node = Node { residual, scaled, change: Quad::default() };
-            sum = sum + residual * scaled;
-        }
-        sum.total()
-    }
-}
-
-struct Turn<'a> {
-    d: &'a mut [Quad],
-    nodes: &'a [Node],
-    beta: f32,
-}
-
-impl Kernel for Turn<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        for (d, node) in self.d.iter_mut().zip(self.nodes) {
-            *d = node.scaled.add_scaled(self.beta, *d);
-        }
-    }
-}
-
-struct Image<'a> {
-    matrix: &'a SinglePrecision,
-    d: &'a [Quad],
-    start: usize,
-    out: &'a mut [Quad],
-}
-
-impl Kernel for Image<'_> {
-    type Output = f64;
-    #[inline(always)]
-    fn run(self) -> f64 {
-        let mut sum = Quad::default();
-        for (i, y) in self.out.iter_mut().enumerate() {
-            *y = self.matrix.rounded_row_product(self.start + i, self.d);
-            sum = sum + self.d[self.start + i] * *y;
-        }
-        sum.total()
-    }
-}
-
-struct Descend<'a> {
-    nodes: &'a mut [Node],
-    inverse: &'a [[Quad; 3]],
-    image: &'a [Quad],
-    d: &'a [Quad],
-    alpha: f32,
-}
-
-impl Kernel for Descend<'_> {
-    type Output = f64;
-    #[inline(always)]
-    fn run(self) -> f64 {
-        let mut sum = Quad::default();
-        for (i, node) in self.nodes.iter_mut().enumerate() {
-            let residual = node.residual.add_scaled(-self.alpha, self.image[i]);
-            let scaled = Quad::combine(&self.inverse[i], residual);
-            *node = Node { residual, scaled, change: node.change.add_scaled(self.alpha, self.d[i]) };
-            sum = sum + residual * scaled;
-        }
-        sum.total()
     }
 }
 

@@ -4,7 +4,8 @@
 //! * `single_precision`: the same in f32, for increments
 //! * `gauss_seidel`: block relaxation
 //! * `conjugate_gradient`: preconditioned conjugate gradients
-//! * `mixed_gradient`: the same in single precision, renewed in double
+//! * `sweep_gradient`: the same in single precision, with a symmetric sweep as preconditioner
+//! * `mixed_gradient`: the same renewed in double precision
 //! * `incomplete_cholesky`: a preconditioner
 //! * `envelope_cholesky`: a direct factor, for small or narrow matrices
 //! * `colouring`: groups of items that share no block
@@ -17,6 +18,7 @@ mod gauss_seidel;
 mod incomplete_cholesky;
 mod mixed_gradient;
 mod single_precision;
+mod sweep_gradient;
 
 pub use block_matrix::BlockMatrix;
 pub use colouring::{Colouring, colour};
@@ -26,3 +28,4 @@ pub use gauss_seidel::gauss_seidel_sweep;
 pub use incomplete_cholesky::IncompleteCholesky;
 pub use mixed_gradient::MixedGradient;
 pub use single_precision::{Rounded, SinglePrecision, power_of_two};
+pub use sweep_gradient::{SweepGradient, Term};

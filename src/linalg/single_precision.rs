@@ -14,7 +14,7 @@ pub struct SinglePrecision {
     diagonal: Vec<u32>,
     /// Blocks by columns.
     values: Vec<[f32; 9]>,
-    /// Power of two that brings the largest entry near 1, so that no unit of mass leaves the range of f32.
+    /// [`unit_of`], so that no unit of mass leaves the range of f32.
     scale: f64,
     width: Width,
 }
@@ -31,6 +31,12 @@ pub fn power_of_two(x: f64) -> f64 {
     if x > 0.0 && x.is_finite() && x.is_normal() { f64::from_bits(x.to_bits() & 0x7FF0_0000_0000_0000) } else { 1.0 }
 }
 
+/// The power of two that brings the largest entry of the diagonal blocks near 1.
+pub(super) fn unit_of(matrix: &BlockMatrix) -> f64 {
+    let of = |d: &usize| matrix.values[*d].iter().map(largest).fold(0.0, f64::max);
+    power_of_two(matrix.diagonal.iter().map(of).fold(0.0, f64::max))
+}
+
 fn largest(v: &Vec3) -> f64 {
     v[0].abs().max(v[1].abs()).max(v[2].abs())
 }
@@ -45,14 +51,7 @@ impl SinglePrecision {
 
     /// Rounds `matrix` into the memory of this one.
     pub fn assign(&mut self, matrix: &BlockMatrix) {
-        let scale = power_of_two(
-            matrix
-                .diagonal
-                .iter()
-                .map(|d| matrix.values[*d].iter().map(largest).fold(0.0, f64::max))
-                .fold(0.0, f64::max),
-        );
-        self.scale = scale;
+        self.scale = unit_of(matrix);
         self.width = Width::detect();
         self.row_offsets.clear();
         self.row_offsets.extend(matrix.row_offsets.iter().map(|o| *o as u32));
@@ -60,7 +59,7 @@ impl SinglePrecision {
         self.diagonal.extend(matrix.diagonal.iter().map(|d| *d as u32));
         self.columns.clone_from(&matrix.columns);
         self.values.resize(matrix.values.len(), [0.0; 9]);
-        run_wide(RoundBlocks { values: &mut self.values, blocks: &matrix.values, factor: 1.0 / scale });
+        run_wide(RoundBlocks { values: &mut self.values, blocks: &matrix.values, factor: 1.0 / self.scale });
     }
 
     /// Rounds the vector `f`, relative to its largest entry: increments may be far below the range of f32.

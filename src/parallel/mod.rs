@@ -110,6 +110,28 @@ impl Par<'_> {
         }
     }
 
+    /// Calls `f(start, block of a, block of b)` for disjoint blocks of `size` items of two slices of one length; returns the
+    /// sum of what it returns, in the order of the blocks.
+    pub fn update_pairs_and_sum<A: Send, B: Send>(
+        &self,
+        size: usize,
+        a: &mut [A],
+        b: &mut [B],
+        f: impl Fn(usize, &mut [A], &mut [B]) -> f64 + Sync,
+    ) -> f64 {
+        match self.pool() {
+            Some(pool) if a.len() > size => {
+                let parts = a.par_chunks_mut(size).zip(b.par_chunks_mut(size)).enumerate();
+                let sums: Vec<f64> = pool.install(|| parts.map(|(i, (a, b))| f(i * size, a, b)).collect());
+                sums.into_iter().fold(0.0, |s, part| s + part)
+            }
+            _ => {
+                let parts = a.chunks_mut(size).zip(b.chunks_mut(size)).enumerate();
+                parts.fold(0.0, |s, (i, (a, b))| s + f(i * size, a, b))
+            }
+        }
+    }
+
     /// Calls `f` for every item, items being tasks of unequal size (one body, one tree branch).
     pub fn for_each_task<T: Send>(&self, tasks: &mut [T], f: impl Fn(&mut T) + Sync) {
         match self.pool() {
