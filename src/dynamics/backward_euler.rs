@@ -69,7 +69,7 @@ impl Unconstrained {
                 self.drives.velocities[body.blocks.clone()].copy_from_slice(&moved);
             }
         }
-        par.for_each_task(&mut self.works, |work| work.run(segment, remembered, par));
+        par.within(|| par.for_each_task(&mut self.works, |work| work.run(segment, remembered, par)));
         for work in &self.works {
             self.drives.velocities[model.bodies[work.body].blocks.clone()].copy_from_slice(&work.velocities);
         }

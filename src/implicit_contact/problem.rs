@@ -80,6 +80,17 @@ pub fn solve(
     scratch: &mut SolverScratch,
     par: Par,
 ) -> SolverReport {
+    par.within(|| solve_here(problem, impulses, dv, settings, scratch, par))
+}
+
+fn solve_here(
+    problem: &ContactProblem,
+    impulses: &mut [Vec3],
+    dv: &mut [Vec3],
+    settings: &Settings,
+    scratch: &mut SolverScratch,
+    par: Par,
+) -> SolverReport {
     let packed = PackedContacts::new(problem, par);
     let velocity_scale = velocity_scale(problem);
     let typical_mass = typical_mass(problem, &packed);

@@ -68,6 +68,15 @@ impl Par<'_> {
         }
     }
 
+    /// Runs `f` on a thread of the pool, where each of the calls below starts without a hand-over from outside: for
+    /// stretches of many short ones. On the calling thread when serial.
+    pub fn within<R: Send>(&self, f: impl FnOnce() -> R + Send) -> R {
+        match self.pool() {
+            Some(pool) => pool.install(f),
+            None => f(),
+        }
+    }
+
     /// `out[i] = f(i)` for every index.
     pub fn map_into<T: Send>(&self, out: &mut [T], f: impl Fn(usize) -> T + Sync) {
         self.for_each_block(out, |start, block| {
