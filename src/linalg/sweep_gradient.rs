@@ -439,7 +439,9 @@ mod tests {
         }
         for (k, (i, j)) in pairs.iter().enumerate() {
             let spring = [[3.0, 0.4, 0.0], [0.4, 2.0, 0.1], [0.0, 0.1, 0.5 + (k % 5) as f64]];
-            [(*i, *i, 1.0), (*j, *j, 1.0), (*i, *j, -1.0), (*j, *i, -1.0)].map(|(r, c, s)| put(r, c, &spring, s));
+            for (row, column, s) in [(*i, *i, 1.0), (*j, *j, 1.0), (*i, *j, -1.0), (*j, *i, -1.0)] {
+                put(row, column, &spring, s);
+            }
         }
         a
     }
