@@ -11,7 +11,6 @@ use super::newton_system::{Acting, NewtonSystem};
 use super::packed_contacts::{contact_velocity, relative_velocity, world_stiffness};
 use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work, measure};
 use super::stop_test::{Ending, Run, Stagnation, StopTest, Verdict};
-use crate::linalg::SweepGradient;
 use crate::math::{Mat3, Vec3, add_scaled, dot, mat_add, mat_scale, mat_vec, norm, sub};
 use crate::model::FrictionCone;
 use crate::parallel::BLOCK;
@@ -189,9 +188,9 @@ impl Lagrangian<'_, '_> {
                 let follows = iterations > 0 && *p != [0.0; 3];
                 penalty.bound = if follows { damping.follow(penalty.bound, bound) } else { bound };
             }
-            iterations += self.minimise(&mut now, &mut buffers.sweep, iterations_max - iterations, exact);
+            iterations += self.minimise(&mut now, iterations_max - iterations, exact);
             while factored && self.gradient_velocity() > settled && iterations < iterations_max {
-                iterations += self.minimise(&mut now, &mut buffers.sweep, iterations_max - iterations, exact);
+                iterations += self.minimise(&mut now, iterations_max - iterations, exact);
             }
             now.p.fill([0.0; 3]);
             for acting in &self.system.acting {
@@ -233,7 +232,7 @@ impl Lagrangian<'_, '_> {
 
     /// Newton steps over `dv` with the multipliers and bounds as they are; leaves the next multipliers in `trial`. Returns
     /// the steps of the linear solves.
-    fn minimise(&mut self, now: &mut Iterate, sweep: &mut SweepGradient, iterations_max: u32, exact: f64) -> u32 {
+    fn minimise(&mut self, now: &mut Iterate, iterations_max: u32, exact: f64) -> u32 {
         let factored = self.direct.is_some();
         let mut iterations = 0;
         for newton in 0..if factored { NEWTON_STEPS_FACTORED } else { NEWTON_STEPS } {
@@ -242,7 +241,7 @@ impl Lagrangian<'_, '_> {
             if (newton > 0 && self.gradient_velocity() <= enough) || iterations >= iterations_max {
                 return iterations;
             }
-            iterations += self.newton_step(sweep, iterations_max - iterations).max(1);
+            iterations += self.newton_step(iterations_max - iterations).max(1);
             self.line_search(now);
         }
         self.evaluate(now);
@@ -302,7 +301,7 @@ impl Lagrangian<'_, '_> {
     }
 
     /// Solves for the Newton step; returns the steps of the linear solve.
-    fn newton_step(&mut self, sweep: &mut SweepGradient, steps_max: u32) -> u32 {
+    fn newton_step(&mut self, steps_max: u32) -> u32 {
         let Task { problem, packed, .. } = *self.task;
         if let Some(direct) = &mut self.direct {
             for (step, g) in self.step.iter_mut().zip(&self.gradient) {
@@ -316,7 +315,7 @@ impl Lagrangian<'_, '_> {
             }
         }
         let control = (LINEAR_SOLVE.0, LINEAR_SOLVE.1.min(steps_max));
-        self.system.solve(self.task, sweep, &self.gradient, &mut self.step, control, &mut self.work)
+        self.system.solve(self.task, &self.gradient, &mut self.step, control, &mut self.work)
     }
 
     /// Moves `now.dv` along the step, all of it where that leaves a small slope.

@@ -1,13 +1,13 @@
 //! A Newton step of the augmented Lagrangian: the contacts that act in it, and its linear system `(A + C^T E C) x = b`
-//! by preconditioned conjugate gradients in single precision. Steps are wanted to a digit.
+//! by preconditioned conjugate gradients [Hestenes52] in single precision. Steps are wanted to a digit.
 
 use super::incidence::Incidence;
 use super::packed_contacts::Contact;
 use super::residuals::{Task, Work};
 use super::single_pass::{General, NONE, general, seen};
-use crate::linalg::{SweepGradient, Term, power_of_two};
+use crate::linalg::power_of_two;
 use crate::math::simd::Quad;
-use crate::math::{Mat3, Vec3, ZERO_MATRIX, inverse, mat_add};
+use crate::math::{Mat3, Vec3, inverse, mat_add};
 use crate::parallel::Par;
 
 /// A contact that presses at the trial, or carries a multiplier.
@@ -32,6 +32,14 @@ struct Resisting {
     general: u32,
 }
 
+/// What conjugate gradients keep of a block.
+#[derive(Clone, Copy, Debug, Default)]
+struct Node {
+    x: Quad,
+    residual: Quad,
+    preconditioned: Quad,
+}
+
 /// The acting contacts and the linear system; capacity is kept from step to step.
 #[derive(Default)]
 pub(super) struct NewtonSystem {
@@ -43,9 +51,11 @@ pub(super) struct NewtonSystem {
     pub incidence: Incidence,
     resisting: Vec<Resisting>,
     general: Vec<General>,
-    /// Diagonal blocks of `C^T E C`.
-    diagonal: Vec<Mat3>,
-    own_columns: Vec<[Quad; 3]>,
+    /// Columns of the inverse diagonal blocks of the system.
+    preconditioner: Vec<[Quad; 3]>,
+    nodes: Vec<Node>,
+    direction: Vec<Quad>,
+    image: Vec<Quad>,
     forces: Vec<Quad>,
 }
 
@@ -65,103 +75,125 @@ impl NewtonSystem {
     pub fn solve(
         &mut self,
         task: &Task,
-        sweep: &mut SweepGradient,
         gradient: &[Vec3],
         step: &mut [Vec3],
         (tolerance, steps_max): (f64, u32),
         work: &mut Work,
     ) -> u32 {
         let par = task.par;
-        let mass = sweep.unit();
-        let load = power_of_two(gradient.iter().flatten().fold(0.0f64, |a, g| a.max(g.abs())));
-        self.round(task, sweep);
-        sweep.forget();
-        let mut rho = sweep.begin(|b| gradient[b].map(|g| -g), load, par);
+        let mass = task.single.unit();
+        let largest = gradient.iter().flatten().fold(0.0f64, |a, g| a.max(g.abs()));
+        let load = power_of_two(largest);
+        self.round(task, mass);
+        self.nodes.resize(gradient.len(), Node::default());
+        self.direction.resize(gradient.len(), Quad::default());
+        self.image.resize(gradient.len(), Quad::default());
+        let preconditioner = &self.preconditioner[..];
+        let mut rho = par.update_and_sum(&mut self.nodes, |start, part| {
+            let mut sum = Quad::default();
+            for (i, node) in part.iter_mut().enumerate() {
+                let residual = Quad::round(gradient[start + i], -1.0 / load);
+                let preconditioned = Quad::combine(&preconditioner[start + i], residual);
+                *node = Node { x: Quad::default(), residual, preconditioned };
+                sum = sum + residual * preconditioned;
+            }
+            sum.total()
+        });
+        let nodes = &self.nodes;
+        par.map_into(&mut self.direction, |b| nodes[b].preconditioned);
         let target = tolerance * tolerance * rho;
-        let (mut steps, mut beta) = (0, 0.0);
+        let mut steps = 0;
         while steps < steps_max && rho > target {
-            let curvature = sweep.turn(beta, &mut Resistance { system: self }, par);
+            let curvature = self.apply(task);
             if !(curvature > 0.0 && rho.is_finite()) {
                 break;
             }
             steps += 1;
-            let next = sweep.descend((rho / curvature) as f32, par);
+            let next = self.advance(par, (rho / curvature) as f32);
             if next.is_nan() || next < 0.0 {
                 break;
             }
-            beta = (next / rho) as f32;
+            let beta = (next / rho) as f32;
             rho = next;
+            let nodes = &self.nodes;
+            par.for_each_block(&mut self.direction, |start, part| {
+                for (i, d) in part.iter_mut().enumerate() {
+                    *d = nodes[start + i].preconditioned.add_scaled(beta, *d);
+                }
+            });
         }
         work.blocks += u64::from(steps) * task.problem.matrix.values.len() as u64;
         work.contacts += u64::from(steps) * 2 * self.acting.len() as u64;
-        par.map_into(step, |b| sweep.change(b).widen(load / mass));
+        let nodes = &self.nodes;
+        par.map_into(step, |b| nodes[b].x.widen(load / mass));
         steps
     }
 
-    /// Rounds contacts and diagonal, relative to the unit of mass.
-    fn round(&mut self, task: &Task, sweep: &mut SweepGradient) {
-        let (rows, packed, problem, mass) = (task.problem.rows, task.packed, task.problem, sweep.unit());
+    /// Rounds contacts and preconditioner, relative to `mass`.
+    fn round(&mut self, task: &Task, mass: f64) {
+        let (rows, packed) = (task.problem.rows, task.packed);
         self.general.clear();
         self.resisting.clear();
         for acting in &self.acting {
             let contact: &Contact = &packed.contacts[acting.contact as usize];
             let e = acting.stiffness.unwrap_or_default();
             let mut record = Resisting {
-                blocks: contact.blocks.map(|b| sweep.position(b as usize)),
+                blocks: contact.blocks,
                 weights: contact.weights.map(|w| w as f32),
                 stiffness: columns(&e, 1.0 / mass),
                 general: NONE,
             };
             if contact.general {
                 record.general = self.general.len() as u32;
-                self.general.push(general(rows, contact.source as usize, |b| sweep.position(b as usize)));
+                self.general.push(general(rows, contact.source as usize));
             }
             self.resisting.push(record);
         }
         self.forces.resize(self.resisting.len(), Quad::default());
-        let (incidence, acting) = (&self.incidence, &self.acting);
-        self.diagonal.resize(problem.inverse_diagonal.len(), ZERO_MATRIX);
-        task.par.map_into(&mut self.diagonal, |b| {
-            let mut sum = ZERO_MATRIX;
-            if incidence.touches(b) {
-                incidence.add_diagonal(b, &mut sum, |k| acting[k].stiffness);
+        let (incidence, acting, problem) = (&self.incidence, &self.acting, task.problem);
+        self.preconditioner.resize(problem.inverse_diagonal.len(), [Quad::default(); 3]);
+        task.par.map_into(&mut self.preconditioner, |b| {
+            let source = &problem.inverse_diagonal[b];
+            if *source == [[0.0; 3]; 3] || !incidence.touches(b) {
+                return columns(source, mass);
             }
-            sum
+            let mut sum = [[0.0; 3]; 3];
+            incidence.add_diagonal(b, &mut sum, |k| acting[k].stiffness);
+            let inverse = inverse(&mat_add(problem.matrix.diagonal_block(b), &sum));
+            columns(&inverse.unwrap_or(*source), mass)
         });
-        let diagonal = &self.diagonal;
-        sweep.set_inverse(
-            |b| {
-                let source = problem.inverse_diagonal[b];
-                if source == ZERO_MATRIX || diagonal[b] == ZERO_MATRIX {
-                    return source;
-                }
-                inverse(&mat_add(problem.matrix.diagonal_block(b), &diagonal[b])).unwrap_or(ZERO_MATRIX)
-            },
-            task.par,
-        );
-        self.own_columns.resize(diagonal.len(), [Quad::default(); 3]);
-        task.par.map_into(&mut self.own_columns, |b| columns(&diagonal[b], 1.0 / mass));
-    }
-}
-
-/// `C^T E C` beside the matrix.
-struct Resistance<'a> {
-    system: &'a mut NewtonSystem,
-}
-
-impl Term for Resistance<'_> {
-    fn apply(&mut self, direction: &[Quad], par: Par) {
-        let NewtonSystem { resisting, general, forces, .. } = &mut *self.system;
-        par.map_into(forces, |k| resisting[k].force(general, direction));
     }
 
-    #[inline(always)]
-    fn beside_diagonal(&self, row: usize, own: Quad) -> Quad {
-        let NewtonSystem { incidence, forces, own_columns, .. } = &*self.system;
-        if !incidence.touches(row) {
-            return Quad::default();
-        }
-        incidence.gather_rounded(row, forces) - Quad::combine(&own_columns[row], own)
+    /// `image := (A + C^T E C) direction`; returns `direction . image`.
+    fn apply(&mut self, task: &Task) -> f64 {
+        let (resisting, general, direction) = (&self.resisting[..], &self.general[..], &self.direction[..]);
+        task.par.map_into(&mut self.forces, |k| resisting[k].force(general, direction));
+        let (incidence, forces, single) = (&self.incidence, &self.forces[..], task.single);
+        task.par.update_and_sum(&mut self.image, |start, part| {
+            let mut sum = Quad::default();
+            for (i, y) in part.iter_mut().enumerate() {
+                let b = start + i;
+                *y = single.rounded_row_product(b, direction) + incidence.gather_rounded(b, forces);
+                sum = sum + direction[b] * *y;
+            }
+            sum.total()
+        })
+    }
+
+    /// Moves by `alpha` along the direction; returns the new squared residual.
+    fn advance(&mut self, par: Par, alpha: f32) -> f64 {
+        let (direction, image, preconditioner) = (&self.direction[..], &self.image[..], &self.preconditioner[..]);
+        par.update_and_sum(&mut self.nodes, |start, part| {
+            let mut sum = Quad::default();
+            for (i, node) in part.iter_mut().enumerate() {
+                let b = start + i;
+                node.x = node.x.add_scaled(alpha, direction[b]);
+                node.residual = node.residual.add_scaled(-alpha, image[b]);
+                node.preconditioned = Quad::combine(&preconditioner[b], node.residual);
+                sum = sum + node.residual * node.preconditioned;
+            }
+            sum.total()
+        })
     }
 }
 

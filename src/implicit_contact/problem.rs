@@ -12,7 +12,7 @@ use super::velocity_error::velocity_error;
 use super::{accelerated_relaxation, augmented_lagrangian, block_diagonal, full_anticipation, splitting_start};
 use crate::constraint::RowSet;
 use crate::linalg::{BlockMatrix, SinglePrecision};
-use crate::math::{Mat3, Vec3, ZERO_MATRIX, is_finite, mat_vec};
+use crate::math::{Mat3, Vec3, is_finite, mat_vec};
 use crate::model::{Settings, SolverChoice};
 use crate::parallel::Par;
 
@@ -95,7 +95,6 @@ fn solve_here(
     let velocity_scale = velocity_scale(problem);
     let typical_mass = typical_mass(problem, &packed);
     let single = SinglePrecision::new(problem.matrix);
-    scratch.measure.sweep.assign(problem.matrix, |b| problem.inverse_diagonal[b] == ZERO_MATRIX);
     let task = Task {
         problem,
         single: &single,

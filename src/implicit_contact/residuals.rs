@@ -3,7 +3,7 @@
 
 use super::packed_contacts::{PackedContacts, contact_velocity};
 use super::problem::ContactProblem;
-use crate::linalg::{SinglePrecision, SweepGradient};
+use crate::linalg::SinglePrecision;
 use crate::math::{Vec3, dot, mat_vec, sub};
 use crate::model::Settings;
 use crate::parallel::{BLOCK, Par};
@@ -138,8 +138,6 @@ pub(super) struct MeasureBuffers {
     pub product: Vec<Vec3>,
     /// `C^T p` of the last call.
     pub contact: Vec<Vec3>,
-    /// Conjugate gradients on the metric.
-    pub sweep: SweepGradient,
 }
 
 /// All residuals of an iterate, from `dv` and `p` alone. Cost: one product with A and one pass over the contacts.

@@ -190,7 +190,7 @@ impl<'a> SinglePass<'a> {
             record.normal[3] = contact.friction as f32;
             if contact.general {
                 record.general = self.general.len() as u32;
-                self.general.push(general(self.rows, contact.source as usize, |b| b));
+                self.general.push(general(self.rows, contact.source as usize));
             }
             let record = self.measured(record);
             self.records.push(record);
@@ -333,13 +333,13 @@ impl Record {
     }
 }
 
-/// The entries of row `i`, rounded, with the place that each block has.
-pub(super) fn general(rows: &RowSet, i: usize, place: impl Fn(u32) -> u32) -> General {
+/// The entries of row `i`, rounded.
+pub(super) fn general(rows: &RowSet, i: usize) -> General {
     let linear = rows.offsets[i] as usize..rows.offsets[i + 1] as usize;
     let angular = rows.angular_offsets[i] as usize..rows.angular_offsets[i + 1] as usize;
     General {
-        linear: linear.map(|k| (place(rows.blocks[k]), rows.weights[k] as f32)).collect(),
-        angular: rows.angular[angular].iter().map(|a| (place(a.block), Quad::round(a.lever, 1.0))).collect(),
+        linear: linear.map(|k| (rows.blocks[k], rows.weights[k] as f32)).collect(),
+        angular: rows.angular[angular].iter().map(|a| (a.block, Quad::round(a.lever, 1.0))).collect(),
     }
 }
 

@@ -1,9 +1,10 @@
 //! An estimate of the velocity error, which residuals do not bound on soft metrics.
 
 use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work};
-use crate::linalg::{SweepGradient, power_of_two};
+use crate::linalg::{SinglePrecision, power_of_two};
+use crate::math::simd::{Kernel, Quad, run_wide};
 use crate::math::{dot, sub};
-use crate::parallel::Par;
+use crate::parallel::{BLOCK, Par};
 
 /// Conjugate gradient steps of the estimate at most.
 const STEPS: usize = 24;
@@ -43,13 +44,21 @@ pub(super) fn velocity_error(
         let r = sub(contact[b], product[b]);
         m.max(r[0].abs()).max(r[1].abs()).max(r[2].abs())
     });
-    let (sweep, unit) = (&mut buffers.sweep, power_of_two(largest));
-    let mass = sweep.unit();
-    sweep.set_inverse(|b| task.problem.inverse_diagonal[b], task.par);
-    sweep.forget();
-    let rho = sweep.begin(|b| sub(contact[b], product[b]), unit, task.par);
+    let (mass, unit) = (task.single.unit(), power_of_two(largest));
+    let mut system = ErrorSystem {
+        matrix: task.single,
+        inverse: task.par.map_indexed(blocks, |b| {
+            let a = &task.problem.inverse_diagonal[b];
+            [0, 1, 2].map(|c| Quad::round([a[0][c], a[1][c], a[2][c]], mass))
+        }),
+        residual: task.par.map_indexed(blocks, |b| Quad::round(sub(contact[b], product[b]), 1.0 / unit)),
+        preconditioned: vec![Quad::default(); blocks],
+        direction: vec![Quad::default(); blocks],
+        image: vec![Quad::default(); blocks],
+        par: task.par,
+    };
     // The sum is of squares of impulses over masses.
-    let (terms, steps) = terms(sweep, rho, enough * mass / (unit * unit), task.par);
+    let (terms, steps) = system.terms(enough * mass / (unit * unit));
     work.blocks += steps as u64 * task.problem.matrix.values.len() as u64;
     let total: f64 = terms[..steps].iter().sum();
     let tail = geometric_tail(&terms[..steps]);
@@ -57,31 +66,130 @@ pub(super) fn velocity_error(
     if error.is_finite() { error } else { f64::INFINITY }
 }
 
-/// What each step of conjugate gradients on `A e = r` takes off the squared error, and how many there are; ends early once
-/// their sum is above `enough` or hardly grows.
-fn terms(sweep: &mut SweepGradient, mut rho: f64, enough: f64, par: Par) -> ([f64; STEPS], usize) {
-    let mut terms = [0.0; STEPS];
-    let (mut total, mut beta) = (0.0, 0.0);
-    for step in 0..STEPS {
-        if rho <= 0.0 {
-            return (terms, step);
+/// Conjugate gradients on `A e = r`, for the squared error that each step takes away.
+struct ErrorSystem<'a> {
+    matrix: &'a SinglePrecision,
+    inverse: Vec<[Quad; 3]>,
+    residual: Vec<Quad>,
+    preconditioned: Vec<Quad>,
+    direction: Vec<Quad>,
+    image: Vec<Quad>,
+    par: Par<'a>,
+}
+
+impl ErrorSystem<'_> {
+    /// The terms, and how many there are; ends early once their sum is above `enough` or hardly grows.
+    fn terms(&mut self, enough: f64) -> ([f64; STEPS], usize) {
+        let mut terms = [0.0; STEPS];
+        let (mut total, mut beta) = (0.0, 0.0);
+        let mut rho = self.descend(0.0);
+        for step in 0..STEPS {
+            if rho <= 0.0 {
+                return (terms, step);
+            }
+            let curvature = self.advance(beta);
+            if curvature.is_nan() || curvature <= 0.0 {
+                return (terms, step);
+            }
+            let alpha = rho / curvature;
+            terms[step] = alpha * rho;
+            total += terms[step];
+            let little = step >= 3 && terms[step] + terms[step - 1] < 0.02 * total;
+            if little || total > enough {
+                return (terms, step + 1);
+            }
+            let next = self.descend(alpha);
+            beta = next / rho;
+            rho = next;
         }
-        let curvature = sweep.turn(beta as f32, &mut (), par);
-        if curvature.is_nan() || curvature <= 0.0 {
-            return (terms, step);
-        }
-        let alpha = rho / curvature;
-        terms[step] = alpha * rho;
-        total += terms[step];
-        let little = step >= 3 && terms[step] + terms[step - 1] < 0.02 * total;
-        if little || total > enough {
-            return (terms, step + 1);
-        }
-        let next = sweep.descend(alpha as f32, par);
-        beta = next / rho;
-        rho = next;
+        (terms, STEPS)
     }
-    (terms, STEPS)
+
+    /// Next direction and its image; returns the curvature.
+    fn advance(&mut self, beta: f64) -> f64 {
+        let preconditioned = &self.preconditioned[..];
+        self.par.for_each_block(&mut self.direction, |start, d| {
+            run_wide(Turn { d, z: &preconditioned[start..], beta: beta as f32 });
+        });
+        let (matrix, d) = (self.matrix, &self.direction[..]);
+        let mut tasks: Vec<(usize, &mut [Quad], f64)> =
+            self.image.chunks_mut(BLOCK).enumerate().map(|(i, c)| (i * BLOCK, c, 0.0)).collect();
+        self.par
+            .for_each_task(&mut tasks, |(start, out, sum)| *sum = run_wide(Image { matrix, d, start: *start, out }));
+        tasks.iter().map(|t| t.2).sum()
+    }
+
+    /// Takes `alpha` images off the residual; returns its square in the norm of the inverse diagonal.
+    fn descend(&mut self, alpha: f64) -> f64 {
+        let (inverse, image) = (&self.inverse[..], &self.image[..]);
+        let parts = self.residual.chunks_mut(BLOCK).zip(self.preconditioned.chunks_mut(BLOCK)).enumerate();
+        let mut tasks: Vec<(Descend, f64)> = parts
+            .map(|(i, (r, z))| {
+                let s = i * BLOCK;
+                (Descend { r, z, inverse: &inverse[s..], image: &image[s..], alpha: alpha as f32 }, 0.0)
+            })
+            .collect();
+        self.par.for_each_task(&mut tasks, |(kernel, sum)| *sum = run_wide(kernel));
+        tasks.iter().map(|t| t.1).sum()
+    }
+}
+
+struct Turn<'a> {
+    d: &'a mut [Quad],
+    z: &'a [Quad],
+    beta: f32,
+}
+
+impl Kernel for Turn<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        for (d, z) in self.d.iter_mut().zip(self.z) {
+            *d = z.add_scaled(self.beta, *d);
+        }
+    }
+}
+
+struct Image<'a> {
+    matrix: &'a SinglePrecision,
+    d: &'a [Quad],
+    start: usize,
+    out: &'a mut [Quad],
+}
+
+impl Kernel for Image<'_> {
+    type Output = f64;
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let mut sum = Quad::default();
+        for (i, y) in self.out.iter_mut().enumerate() {
+            *y = self.matrix.rounded_row_product(self.start + i, self.d);
+            sum = sum + self.d[self.start + i] * *y;
+        }
+        sum.total()
+    }
+}
+
+struct Descend<'a> {
+    r: &'a mut [Quad],
+    z: &'a mut [Quad],
+    inverse: &'a [[Quad; 3]],
+    image: &'a [Quad],
+    alpha: f32,
+}
+
+impl Kernel for &mut Descend<'_> {
+    type Output = f64;
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let mut sum = Quad::default();
+        for (i, (r, z)) in self.r.iter_mut().zip(self.z.iter_mut()).enumerate() {
+            *r = r.add_scaled(-self.alpha, self.image[i]);
+            *z = Quad::combine(&self.inverse[i], *r);
+            sum = sum + *r * *z;
+        }
+        sum.total()
+    }
 }
 
 /// Sum of the terms that a slowly decaying series still has to come, from its last two thirds.

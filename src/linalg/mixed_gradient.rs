@@ -92,7 +92,7 @@ impl MixedGradient {
             let enough = (SAFETY * target / square).max(RENEWAL) * rho;
             let mut sound = true;
             while sound {
-                let curvature = self.sweep.turn(beta as f32, &mut (), par);
+                let curvature = self.sweep.turn(beta as f32, par);
                 sound = curvature > 0.0 && rho.is_finite();
                 if sound {
                     let next = self.sweep.descend((rho / curvature) as f32, par);

@@ -28,4 +28,4 @@ pub use gauss_seidel::gauss_seidel_sweep;
 pub use incomplete_cholesky::IncompleteCholesky;
 pub use mixed_gradient::MixedGradient;
 pub use single_precision::{Rounded, SinglePrecision, power_of_two};
-pub use sweep_gradient::{SweepGradient, Term};
+pub use sweep_gradient::SweepGradient;

@@ -17,25 +17,6 @@ const ROWS: usize = 512;
 /// Colours that are shared; rows that find none of them have one each.
 const COLOURS_SHARED: usize = 64;
 
-/// A symmetric positive semi-definite term beside the matrix. Its diagonal blocks are in the diagonal of the sweep.
-pub trait Term: Sync {
-    /// Takes the direction, by position.
-    fn apply(&mut self, direction: &[Quad], par: Par);
-
-    /// Its product with the direction at a row, less that of its diagonal block with the row's own direction.
-    fn beside_diagonal(&self, row: usize, own: Quad) -> Quad;
-}
-
-/// No term.
-impl Term for () {
-    fn apply(&mut self, _: &[Quad], _: Par) {}
-
-    #[inline(always)]
-    fn beside_diagonal(&self, _: usize, _: Quad) -> Quad {
-        Quad::default()
-    }
-}
-
 /// What a step keeps of a row.
 #[derive(Clone, Copy, Debug, Default)]
 struct Node {
@@ -81,12 +62,7 @@ impl SweepGradient {
         self.rows.unit
     }
 
-    /// Position of a row in the order of the sweep.
-    pub fn position(&self, row: usize) -> u32 {
-        self.rows.position[row]
-    }
-
-    /// Takes the inverse diagonal blocks, those of a term included; zero leaves a row out.
+    /// Takes the inverse diagonal blocks; zero leaves a row out.
     pub fn set_inverse(&mut self, inverse: impl Fn(usize) -> Mat3 + Sync, par: Par) {
         let (order, mass) = (&self.rows.order, self.rows.unit);
         par.map_into(&mut self.inverse, |i| {
@@ -117,7 +93,7 @@ impl SweepGradient {
     }
 
     /// The next direction, `beta` times the last one added, and its image; returns the curvature along it.
-    pub fn turn(&mut self, beta: f32, term: &mut impl Term, par: Par) -> f64 {
+    pub fn turn(&mut self, beta: f32, par: Par) -> f64 {
         let (rows, inverse) = (&self.rows, &self.inverse);
         for colour in (0..rows.colours()).rev() {
             let range = rows.range(colour);
@@ -128,14 +104,13 @@ impl SweepGradient {
                 0.0
             });
         }
-        term.apply(&self.back, par);
-        let (mut sum, term, back) = (0.0, &*term, &self.back);
+        let mut sum = 0.0;
         for colour in 0..rows.colours() {
             let range = rows.range(colour);
             let (done, rest) = self.forth.split_at_mut(range.start);
             let (own, nodes) = (&mut rest[..range.len()], &mut self.nodes[range.clone()]);
             sum += par.update_pairs_and_sum(ROWS, nodes, own, |at, nodes, solved| {
-                run_wide(Forth { rows, inverse, term, back, done, nodes, solved, first: range.start + at })
+                run_wide(Forth { rows, inverse, done, nodes, solved, first: range.start + at })
             });
         }
         sum
@@ -368,26 +343,23 @@ impl Kernel for Back<'_> {
     }
 }
 
-struct Forth<'a, T> {
+struct Forth<'a> {
     rows: &'a ColouredRows,
     inverse: &'a [[Quad; 3]],
-    term: &'a T,
-    back: &'a [Quad],
     done: &'a [Quad],
     nodes: &'a mut [Node],
     solved: &'a mut [Quad],
     first: usize,
 }
 
-impl<T: Term> Kernel for Forth<'_, T> {
+impl Kernel for Forth<'_> {
     type Output = f64;
     #[inline(always)]
     fn run(self) -> f64 {
         let mut sum = Quad::default();
         for (i, (node, solved)) in self.nodes.iter_mut().zip(self.solved).enumerate() {
             let at = self.first + i;
-            let beside = self.term.beside_diagonal(self.rows.order[at] as usize, self.back[at]);
-            let right = (node.image + beside) - self.rows.before(at, self.done);
+            let right = node.image - self.rows.before(at, self.done);
             *solved = Quad::combine(&self.inverse[at], right);
             node.image = (node.weighted_direction - node.image) + right;
             sum = sum + node.direction * node.image;
@@ -421,7 +393,7 @@ impl Kernel for Descend<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{ZERO_MATRIX, add, add_scaled, dot, inverse, mat_add, mat_scale, mat_vec, norm, sub};
+    use crate::math::{ZERO_MATRIX, inverse, mat_add, mat_scale, norm, sub};
 
     /// Springs along a ring, from one row to 90 others, and between all of 70: more colours than may be shared.
     fn wheel(n: u32) -> BlockMatrix {
@@ -446,75 +418,37 @@ mod tests {
         a
     }
 
-    /// `s u u^T` on some rows.
-    struct Rank1 {
-        rows: Vec<(usize, u32)>,
-        u: Vec3,
-        strength: f64,
-        seen: f64,
-    }
-
-    impl Rank1 {
-        fn at(&self, row: usize) -> f64 {
-            if self.rows.iter().any(|(r, _)| *r == row) { 1.0 } else { 0.0 }
-        }
-    }
-
-    impl Term for Rank1 {
-        fn apply(&mut self, direction: &[Quad], _: Par) {
-            let along = |(_, p): &(usize, u32)| dot(self.u, direction[*p as usize].widen(1.0));
-            self.seen = self.strength * self.rows.iter().map(along).sum::<f64>();
-        }
-        fn beside_diagonal(&self, row: usize, own: Quad) -> Quad {
-            let own = self.strength * dot(self.u, own.widen(1.0));
-            Quad::round(self.u, self.at(row) * (self.seen - own))
-        }
-    }
-
     #[test]
-    fn solves_with_a_term_beside_the_matrix_without_the_fixed_rows_and_with_the_same_bits_on_threads() {
+    fn solves_without_the_fixed_rows_and_with_the_same_bits_on_threads() {
         let a = wheel(3000);
         let is_fixed = |i: usize| i.is_multiple_of(41);
         let b: Vec<Vec3> = (0..3000).map(|i| [f64::from(i % 7) - 3.0, 1.0, f64::from(i % 11)]).collect();
-        let u = [0.6, 0.0, 0.8];
         let run = |par: Par| {
             let mut sweep = SweepGradient::default();
             sweep.assign(&a, is_fixed);
             sweep.assign(&a, is_fixed);
-            let strength = 30.0 / sweep.unit();
-            let rows: Vec<(usize, u32)> = (0..3000).step_by(101).map(|i| (i + 1, sweep.position(i + 1))).collect();
-            let mut term = Rank1 { rows: rows.clone(), u, strength, seen: 0.0 };
-            let diagonal = |i: usize| {
-                let own = if rows.iter().any(|(r, _)| *r == i) { 30.0 } else { 0.0 };
-                let outer = [0, 1, 2].map(|r| [0, 1, 2].map(|c| own * u[r] * u[c]));
-                if is_fixed(i) { None } else { inverse(&mat_add(a.diagonal_block(i), &outer)) }
-            };
+            let diagonal = |i: usize| if is_fixed(i) { None } else { inverse(a.diagonal_block(i)) };
             sweep.set_inverse(|i| diagonal(i).unwrap_or(ZERO_MATRIX), par);
             let (mut rho, mut beta, mut steps) = (sweep.begin(|i| b[i], 1.0, par), 0.0, 0);
             let first = rho;
             while rho > 1e-11 * first && steps < 300 {
-                let curvature = sweep.turn(beta as f32, &mut term, par);
+                let curvature = sweep.turn(beta as f32, par);
                 let next = sweep.descend((rho / curvature) as f32, par);
                 (beta, rho, steps) = (next / rho, next, steps + 1);
             }
-            let x: Vec<Vec3> = (0..3000).map(|i| sweep.change(i).widen(1.0 / sweep.unit())).collect();
-            (x, steps, term)
+            ((0..3000).map(|i| sweep.change(i).widen(1.0 / sweep.unit())).collect::<Vec<Vec3>>(), steps)
         };
-        let (x, steps, term) = run(Par::Serial);
-        let pushed = 30.0 * term.rows.iter().filter(|(r, _)| !is_fixed(*r)).map(|(r, _)| dot(u, x[*r])).sum::<f64>();
+        let (x, steps) = run(Par::Serial);
         let mut worst = 0.0f64;
         for i in 0..3000 {
             if is_fixed(i) {
                 assert_eq!(x[i], [0.0; 3]);
-                continue;
+            } else {
+                worst = worst.max(norm(sub(b[i], a.row_product(i, &x))));
             }
-            let product = (a.row_offsets[i]..a.row_offsets[i + 1])
-                .fold([0.0; 3], |s, k| add(s, mat_vec(&a.values[k], x[a.columns[k] as usize])));
-            worst = worst.max(norm(sub(b[i], add_scaled(product, term.at(i) * pushed, u))));
         }
         assert!(worst < 5e-3 && steps < 200, "residual {worst} of 10 after {steps} steps");
         let pool = crate::parallel::Pool::new(3).unwrap();
-        let shared = run(Par::Pool(&pool));
-        assert!(shared.0 == x && shared.1 == steps);
+        assert!(run(Par::Pool(&pool)) == (x, steps));
     }
 }
