@@ -102,7 +102,8 @@ pub struct FilterSettings {
     pub restitution: f64,
     /// Stiffness k of the springs between what is closer than its thickness, at least 0, in units of the contact's
     /// effective mass over `dt^2`: 1 makes up for the whole overlap within a step, before the cap on the separation that it
-    /// causes (`recovery_fraction`). 0: no springs.
+    /// causes (`recovery_fraction`), and so carries a load that would fall by the overlap in a step; 10, ten of them.
+    /// 0: no springs.
     pub repulsion_stiffness: f64,
     /// Passes of impulses and continuous detection before the fail-safes.
     pub passes_max: u32,
@@ -110,7 +111,7 @@ pub struct FilterSettings {
 
 impl Default for FilterSettings {
     fn default() -> Self {
-        FilterSettings { restitution: 0.0, repulsion_stiffness: 1.0, passes_max: 10 }
+        FilterSettings { restitution: 0.0, repulsion_stiffness: 10.0, passes_max: 10 }
     }
 }
 

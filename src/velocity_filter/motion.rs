@@ -33,7 +33,7 @@ impl<'a> FilteredMotion<'a> {
     }
 
     /// The rows of contacts about the motion as it is.
-    pub fn rows(&self, contacts: &[Contact]) -> StageRows<'a> {
+    pub fn rows(&self, contacts: &[Contact]) -> StageRows {
         StageRows::new(self.built_rows(contacts), self.metric)
     }
 

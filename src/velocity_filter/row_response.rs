@@ -1,6 +1,6 @@
 //! The response of one row: a normal impulse, and Coulomb friction within its limit [Harmon10, §2.3].
 
-use crate::constraint::{Metric, RowSet};
+use crate::constraint::{Angular, Metric, RowSet};
 use crate::math::{Mat3, Vec3, ZERO_MATRIX, add, add_scaled, cross, dot, inverse, mat_vec, scale};
 
 /// Share of the friction limit within which a contact sticks.
@@ -12,6 +12,26 @@ pub fn inverse_mass(metric: &Metric, block: usize) -> Mat3 {
     if metric.fixed[block] { ZERO_MATRIX } else { inverse(&metric.lumped[block]).unwrap_or(ZERO_MATRIX) }
 }
 
+/// Inverse masses by entry of a set of rows.
+pub struct EntryMasses {
+    /// Of linear entries `[1/kg]`: lumped masses are the same in all directions.
+    linear: Vec<f64>,
+    /// Of angular entries: inverse world inertias.
+    angular: Vec<Mat3>,
+}
+
+impl EntryMasses {
+    /// The lumped inverse masses of all entries.
+    pub fn new(rows: &RowSet, metric: &Metric) -> EntryMasses {
+        let linear = |block: &u32| inverse_mass(metric, *block as usize)[0][0];
+        let angular = |entry: &Angular| inverse_mass(metric, entry.block as usize);
+        EntryMasses {
+            linear: rows.blocks.iter().map(linear).collect(),
+            angular: rows.angular.iter().map(angular).collect(),
+        }
+    }
+}
+
 /// What an impulse on a row does to it and to its blocks.
 pub struct RowResponse {
     /// `K = C M^-1 C^T` in the row's frame `[1/kg]`, by columns.
@@ -20,11 +40,11 @@ pub struct RowResponse {
 
 impl RowResponse {
     /// The response of row `i` under lumped masses. Cost: three scatters.
-    pub fn new(rows: &RowSet, i: usize, metric: &Metric) -> RowResponse {
+    pub fn new(rows: &RowSet, i: usize, masses: &EntryMasses) -> RowResponse {
         let frame = rows.frames[i];
         let columns = frame.map(|axis| {
             let mut u = [0.0; 3];
-            for_each_change(rows, i, metric, axis, |entry, change| {
+            for_each_change(rows, i, masses, axis, |entry, change| {
                 u = match entry {
                     Entry::Linear(weight, _) => add_scaled(u, weight, change),
                     Entry::Angular(lever, _) => add(u, cross(change, lever)),
@@ -79,21 +99,21 @@ pub enum Entry {
 }
 
 /// Tells for each entry of row `i` how the world impulse `f` on the row changes the velocity of its block.
-pub fn for_each_change(rows: &RowSet, i: usize, metric: &Metric, f: Vec3, mut told: impl FnMut(Entry, Vec3)) {
+#[inline]
+pub fn for_each_change(rows: &RowSet, i: usize, masses: &EntryMasses, f: Vec3, mut told: impl FnMut(Entry, Vec3)) {
     for k in rows.offsets[i] as usize..rows.offsets[i + 1] as usize {
         let (block, weight) = (rows.blocks[k] as usize, rows.weights[k]);
-        told(Entry::Linear(weight, block), scale(weight, mat_vec(&inverse_mass(metric, block), f)));
+        told(Entry::Linear(weight, block), scale(weight * masses.linear[k], f));
     }
-    for a in &rows.angular[rows.angular_offsets[i] as usize..rows.angular_offsets[i + 1] as usize] {
-        let block = a.block as usize;
-        told(Entry::Angular(a.lever, block), mat_vec(&inverse_mass(metric, block), cross(a.lever, f)));
+    for k in rows.angular_offsets[i] as usize..rows.angular_offsets[i + 1] as usize {
+        let Angular { block, lever } = rows.angular[k];
+        told(Entry::Angular(lever, block as usize), mat_vec(&masses.angular[k], cross(lever, f)));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::constraint::Angular;
     use crate::math::IDENTITY;
     use crate::math::mat_scale;
 
@@ -123,7 +143,8 @@ mod tests {
     #[test]
     fn an_impulse_reflects_the_normal_velocity_and_friction_only_takes() {
         let (rows, metric) = pair();
-        let response = RowResponse::new(&rows, 0, &metric);
+        let masses = EntryMasses::new(&rows, &metric);
+        let response = RowResponse::new(&rows, 0, &masses);
         for restitution in [0.0, 0.4, 1.0] {
             for mu in [0.0, 0.1, 0.7, 50.0] {
                 let mut v = vec![[1.0, -2.0, -4.0], [0.5, 0.3, 1.0], [2.0, -1.0, 3.0]];
@@ -135,7 +156,7 @@ mod tests {
                 let f = rows.impulse(0, p);
                 let mut given = vec![[0.0; 3]; 3];
                 rows.scatter(0, f, &mut given);
-                for_each_change(&rows, 0, &metric, f, |entry, change| {
+                for_each_change(&rows, 0, &masses, f, |entry, change| {
                     let (Entry::Linear(_, block) | Entry::Angular(_, block)) = entry;
                     let expected = mat_vec(&inverse(&metric.lumped[block]).unwrap(), given[block]);
                     assert!(crate::math::norm(crate::math::sub(change, expected)) < 1e-12);
@@ -158,6 +179,7 @@ mod tests {
     fn a_row_without_finite_mass_takes_no_impulse() {
         let (rows, mut metric) = pair();
         metric.fixed = vec![true; 3];
-        assert_eq!(RowResponse::new(&rows, 0, &metric).normal_impulse(1.0), None);
+        let masses = EntryMasses::new(&rows, &metric);
+        assert_eq!(RowResponse::new(&rows, 0, &masses).normal_impulse(1.0), None);
     }
 }

@@ -1,12 +1,12 @@
 //! The rows of a stage while it gives them impulses.
 
-use super::row_response::{Entry, RowResponse, for_each_change};
+use super::row_response::{Entry, EntryMasses, RowResponse, for_each_change};
 use crate::constraint::{BuiltRows, Metric};
 use crate::math::{Vec3, add, add_scaled};
 
 /// Rows with the impulses given to them, and what these change; each row feels all impulses before.
-pub struct StageRows<'a> {
-    metric: &'a Metric,
+pub struct StageRows {
+    masses: EntryMasses,
     /// The rows, about the motion that the stage found.
     pub built: BuiltRows,
     /// What an impulse does to each.
@@ -21,18 +21,18 @@ pub struct StageRows<'a> {
     change: Vec<Vec3>,
 }
 
-impl<'a> StageRows<'a> {
+impl StageRows {
     /// Rows without impulses; their required gaps must be those of the start. Cost: linear in rows and blocks.
-    pub fn new(built: BuiltRows, metric: &'a Metric) -> StageRows<'a> {
-        let rows = built.rows.len();
+    pub fn new(built: BuiltRows, metric: &Metric) -> StageRows {
+        let (rows, masses) = (built.rows.len(), EntryMasses::new(&built.rows, metric));
         StageRows {
-            responses: (0..rows).map(|row| RowResponse::new(&built.rows, row, metric)).collect(),
+            responses: (0..rows).map(|row| RowResponse::new(&built.rows, row, &masses)).collect(),
             impulses: vec![[0.0; 3]; rows],
             sticks: vec![false; rows],
             separations: vec![0.0; rows],
             change: vec![[0.0; 3]; metric.lumped.len()],
             built,
-            metric,
+            masses,
         }
     }
 
@@ -58,7 +58,7 @@ impl<'a> StageRows<'a> {
         }
         self.impulses[row] = add_scaled(self.impulses[row], 1.0, p);
         let (rows, change) = (&self.built.rows, &mut self.change);
-        for_each_change(rows, row, self.metric, rows.impulse(row, p), |entry, more| {
+        for_each_change(rows, row, &self.masses, rows.impulse(row, p), |entry, more| {
             let (Entry::Linear(_, block) | Entry::Angular(_, block)) = entry;
             change[block] = add(change[block], more);
         });

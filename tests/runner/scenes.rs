@@ -13,7 +13,9 @@ fn check(name: &str, short: u32, all: [u32; 2]) {
     let [starts, steps] = if slow { all } else { [2, short] };
     for seed in 0..starts {
         let (seed, steps) = (seed.to_string(), steps.to_string());
-        let line = report(&folder, &[scene.as_str(), "--jitter", &seed, "--steps", &steps]);
+        // The scenes of the velocity filter.
+        let method = if name.starts_with("squares") { "filter" } else { "implicit" };
+        let line = report(&folder, &[scene.as_str(), "--method", method, "--jitter", &seed, "--steps", &steps]);
         assert_eq!(line["intersections"].as_u64(), Some(0), "{name} {seed}");
         assert!(line["contacts_max"].as_u64() > Some(0), "{name} {seed}: nothing touches");
         println!("{name} {seed}: {line}");
@@ -69,6 +71,8 @@ scenes! {
     soft_pile_soft 6, all: 1 x 100;
     soft_pile_stiff 6, all: 1 x 100;
     spot_pressed 20, all: 4 x 300;
+    squares_incline 144, all: 10 x 144;
+    squares_plane 40, all: 10 x 144;
     stack 60, all: 10 x 300;
     twisted_column 60, all: 2 x 500;
     two_bar 100, all: 10 x 100;
