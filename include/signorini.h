@@ -1042,7 +1042,8 @@ typedef struct SgnMaterialDesc {
    */
   double friction;
   /**
-   * Coefficient of restitution, 0 to 1. The implicit method ignores it: its impacts are inelastic. Default: 0.
+   * Coefficient of restitution, 0 to 1. Read by no method: the velocity filter takes that of `SgnStepDesc`, the implicit
+   * method's impacts are inelastic. Default: 0.
    */
   double restitution;
 } SgnMaterialDesc;
@@ -1799,6 +1800,7 @@ typedef struct SgnStepDesc {
   /**
    * Velocity filter: stiffness of the springs between what is closer than its thickness, in units of effective mass over
    * `dt^2`, 0 to 1e6; 1 makes up for the whole overlap in a step, but for the cap of `recovery_fraction`. 0: no springs.
+   * Default: 10.
    */
   double repulsion_stiffness;
   /**

@@ -30,7 +30,8 @@ pub struct SgnMaterialDesc {
     pub combine: SgnCombine,
     /// Coulomb friction coefficient, at least 0. Default: 0.
     pub friction: f64,
-    /// Coefficient of restitution, 0 to 1. The implicit method ignores it: its impacts are inelastic. Default: 0.
+    /// Coefficient of restitution, 0 to 1. Read by no method: the velocity filter takes that of `SgnStepDesc`, the implicit
+    /// method's impacts are inelastic. Default: 0.
     pub restitution: f64,
 }
 

@@ -137,6 +137,7 @@ pub struct SgnStepDesc {
     pub restitution: f64,
     /// Velocity filter: stiffness of the springs between what is closer than its thickness, in units of effective mass over
     /// `dt^2`, 0 to 1e6; 1 makes up for the whole overlap in a step, but for the cap of `recovery_fraction`. 0: no springs.
+    /// Default: 10.
     pub repulsion_stiffness: f64,
     /// Velocity filter: passes of impulses and continuous detection before the fail-safes, at most 1e6.
     pub passes_max: u32,
