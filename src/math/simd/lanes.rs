@@ -20,8 +20,18 @@ impl<const N: usize> Lanes<N> {
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
         let mut out = self.0;
-        for (a, b) in out.iter_mut().zip(other.0) {
-            *a = f(*a, b);
+        for i in 0..N {
+            out[i] = f(out[i], other.0[i]);
+        }
+        Lanes(out)
+    }
+
+    // Loops by index: adapters of the standard library are not always inlined, and then lose the wide instructions.
+    #[inline(always)]
+    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        let mut out = self.0;
+        for i in 0..N {
+            out[i] = f(out[i]);
         }
         Lanes(out)
     }
@@ -41,21 +51,21 @@ impl<const N: usize> Lanes<N> {
     /// Absolute values.
     #[inline(always)]
     pub fn abs(self) -> Self {
-        Lanes(self.0.map(f64::abs))
+        self.map(f64::abs)
     }
 
     /// Square roots.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
-        Lanes(self.0.map(f64::sqrt))
+        self.map(f64::sqrt)
     }
 
     /// `a` where this is greater than zero, `b` elsewhere, also where it is NaN.
     #[inline(always)]
     pub fn if_positive(self, a: Self, b: Self) -> Self {
         let mut out = b.0;
-        for ((o, c), a) in out.iter_mut().zip(self.0).zip(a.0) {
-            *o = if c > 0.0 { a } else { *o };
+        for i in 0..N {
+            out[i] = if self.0[i] > 0.0 { a.0[i] } else { out[i] };
         }
         Lanes(out)
     }
@@ -63,7 +73,7 @@ impl<const N: usize> Lanes<N> {
     /// Negated values.
     #[inline(always)]
     pub fn negate(self) -> Self {
-        Lanes(self.0.map(|a| -a))
+        self.map(|a| -a)
     }
 }
 

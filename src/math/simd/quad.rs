@@ -65,7 +65,8 @@ impl Quad {
             let last = _mm_loadu_ps(m.as_ptr().add(5));
             [_mm_loadu_ps(m.as_ptr()), _mm_loadu_ps(m.as_ptr().add(3)), _mm_shuffle_ps::<0xF9>(last, last)]
         };
-        Quad::combine(&columns.map(Quad), x)
+        let [a, b, c] = columns;
+        Quad::combine(&[Quad(a), Quad(b), Quad(c)], x)
     }
 
     /// The same with the fourth lane zero.
@@ -106,7 +107,8 @@ impl Quad {
     #[inline(always)]
     pub fn combine_packed(m: &[f32; 9], x: Quad) -> Quad {
         let columns = [[m[0], m[1], m[2], m[3]], [m[3], m[4], m[5], m[6]], [m[6], m[7], m[8], m[8]]];
-        Quad::combine(&columns.map(Quad), x)
+        let [a, b, c] = columns;
+        Quad::combine(&[Quad(a), Quad(b), Quad(c)], x)
     }
 
     /// The same with the fourth lane zero.
@@ -186,8 +188,9 @@ unsafe fn packed_row_avx2(m: &[[f32; 9]], columns: &[u32], x: &[Quad]) -> Quad {
         let (v, w) = (x[columns[0] as usize].0, x[columns[1] as usize].0);
         let join = |a: __m128, b: __m128| _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(a), b);
         // SAFETY: four numbers from 0, 3 and 5 on lie within each nine.
-        let [a, b, c] = unsafe {
-            [0, 3, 5].map(|at| join(_mm_loadu_ps(m[0].as_ptr().add(at)), _mm_loadu_ps(m[1].as_ptr().add(at))))
+        let (a, b, c) = unsafe {
+            let load = |at: usize| join(_mm_loadu_ps(m[0].as_ptr().add(at)), _mm_loadu_ps(m[1].as_ptr().add(at)));
+            (load(0), load(3), load(5))
         };
         let (c, x) = (_mm256_permute_ps::<0xF9>(c), join(v, w));
         let a = _mm256_mul_ps(a, _mm256_permute_ps::<0x00>(x));
