@@ -8,6 +8,7 @@
 //! * `zones`: collisions that share degrees of freedom, grown and answered together
 //! * `zone_projection`: the velocities of a zone projected, with friction
 //! * `zone_rows`: gradients of a zone's collisions
+//! * `zone_factor`: a direct solver in a zone's unknowns
 //! * `minimum_norm`: the inelastic projection, equations that may repeat and contradict each other
 //! * `unilateral_projection`: the projection whose impulses only push
 //! * `zone_friction`: friction per contact and per zone
@@ -21,6 +22,7 @@ mod rigid_zone;
 mod subdivide;
 mod sweep;
 mod unilateral_projection;
+mod zone_factor;
 mod zone_friction;
 mod zone_projection;
 mod zone_rows;

@@ -1,9 +1,8 @@
 //! The smallest change of velocities after which no row falls short: impulses push and never pull [Harmon10, §3.5].
 
-use super::minimum_norm::{DENSE_ROWS, minimum_norm};
+use super::zone_factor::ZoneFactor;
 use super::zone_rows::{ZoneRows, inner};
 use crate::math::{Vec3, add_scaled, scale};
-use nalgebra::{DMatrix, DVector};
 
 /// Penalties, relative to unit rows, from the first update of the multipliers on; the last one stays. Conjugate gradients
 /// bear less than a factor does.
@@ -28,16 +27,10 @@ const GRADIENT_TOLERANCE: f64 = 1e-6;
 const PROGRESS: f64 = 0.5;
 
 /// Complementarity, relative to the largest demand, at which the projection has converged.
-pub(super) const TOLERANCE: f64 = 1e-11;
+const TOLERANCE: f64 = 1e-13;
 
-/// Complementarity below which the rows that push are trusted, and solved as equations.
+/// Complementarity that is accepted where no more is to be had.
 const TRUSTED: f64 = 1e-4;
-
-/// Times that rows which fall short join those that push.
-const REPAIRS: usize = 4;
-
-/// Halvings of a Newton step at most.
-const HALVINGS: usize = 30;
 
 /// A projection with its multipliers: `y = A^T lambda`, `lambda >= 0`.
 pub(super) struct Unilateral {
@@ -50,27 +43,19 @@ pub(super) struct Unilateral {
 ///
 /// The complementarity problem that simplex methods could not solve robustly [Harmon10, §3.5] is the projection onto a
 /// convex cone. The method of multipliers makes it a sequence of smooth convex problems, each solved by Newton steps
-/// (factored for few rows, else by conjugate gradients) with a line search; rows that repeat or contradict each other leave all of these well posed.
-/// Once the set of pushing rows has settled they are solved as equations, which removes what the iteration leaves. Rows
-/// that cannot be met end at the work cap, near their least squares. Cost: at most 40 updates, 200 Newton steps of 400
-/// iterations.
-pub(super) fn unilateral(rows: &ZoneRows, demand: &[f64]) -> Unilateral {
+/// (factored in the unknowns where that is cheap, else by conjugate gradients) with an exact line search; rows that repeat
+/// or contradict each other leave all of these well posed. Everything is in terms of what an update changes, so that
+/// rounding shrinks with it. Rows that cannot be met end at the work cap, near their least squares. Cost: at most 40
+/// updates, 200 Newton steps of a factorisation or 400 iterations.
+pub(super) fn unilateral(rows: &ZoneRows, demand: &[f64], factor: &mut Option<ZoneFactor>) -> Unilateral {
     let size = demand.iter().fold(0.0_f64, |m, c| m.max(*c));
-    let penalties: &[f64] = if rows.len() <= DENSE_ROWS { &PENALTIES_FACTORED } else { &PENALTIES };
-    let mut state = Multipliers { y: vec![[0.0; 3]; rows.width], lambda: vec![0.0; rows.len()] };
-    let mut steps = 0;
-    let mut polished_at = f64::INFINITY;
-    let mut last = f64::INFINITY;
+    let penalties: &[f64] = if factor.is_some() { &PENALTIES_FACTORED } else { &PENALTIES };
+    let mut state = Multipliers::new(rows, demand);
+    let (mut steps, mut last) = (0, f64::INFINITY);
     for update in 0..UPDATES {
-        let complementarity = state.complementarity(rows, demand) / size.max(f64::MIN_POSITIVE);
+        let complementarity = state.complementarity() / size.max(f64::MIN_POSITIVE);
         if size == 0.0 || complementarity <= TOLERANCE {
-            return state.finished(rows, true);
-        }
-        if complementarity <= TRUSTED && complementarity < 1e-2 * polished_at {
-            polished_at = complementarity;
-            if let Some(solution) = polished(rows, demand, &state.lambda, size) {
-                return solution;
-            }
+            return state.finished(true);
         }
         let stalls = update >= penalties.len() && complementarity > PROGRESS * last;
         if stalls || steps >= NEWTON_STEPS {
@@ -79,153 +64,146 @@ pub(super) fn unilateral(rows: &ZoneRows, demand: &[f64]) -> Unilateral {
         last = complementarity;
         let sigma = penalties[update.min(penalties.len() - 1)];
         let tolerance = 1e-2 * size * complementarity.min(1.0);
-        steps += state.minimise(rows, demand, sigma, NEWTON_STEPS - steps, tolerance);
-        for i in 0..rows.len() {
-            state.lambda[i] = (state.lambda[i] + sigma * (demand[i] - rows.product(i, &state.y))).max(0.0);
-        }
+        steps += state.update(rows, demand, sigma, NEWTON_STEPS - steps, tolerance, factor);
     }
-    let converged = state.complementarity(rows, demand) <= TRUSTED * size;
-    state.finished(rows, converged)
-}
-
-/// The rows that push, and those that then fall short, solved as equations; `None` where that is another motion, or some
-/// row still falls short.
-fn polished(rows: &ZoneRows, demand: &[f64], lambda: &[f64], size: f64) -> Option<Unilateral> {
-    let tolerance = TOLERANCE * size;
-    let before = rows.transposed_product(lambda);
-    let mut pushes: Vec<bool> = lambda.iter().map(|l| *l > 0.0).collect();
-    for _ in 0..REPAIRS {
-        let active: Vec<usize> = (0..rows.len()).filter(|i| pushes[*i]).collect();
-        let right: Vec<f64> = active.iter().map(|i| demand[*i]).collect();
-        let solution = minimum_norm(&rows.selected(&active), &right);
-        let short = |i: &usize| rows.product(*i, &solution.y) < demand[*i] - tolerance;
-        let missed: Vec<usize> = (0..rows.len()).filter(short).collect();
-        if missed.iter().any(|i| pushes[*i]) {
-            return None;
-        }
-        if !missed.is_empty() {
-            missed.into_iter().for_each(|i| pushes[i] = true);
-            continue;
-        }
-        // Rows that repeat each other have many multipliers, of which the smallest may pull: then those of the iteration
-        // stand for them, as long as they move the same.
-        let pulls = solution.multipliers.iter().any(|l| *l < -tolerance);
-        let change: Vec<Vec3> = solution.y.iter().zip(&before).map(|(a, b)| add_scaled(*a, -1.0, *b)).collect();
-        if pulls && inner(&change, &change) > TRUSTED * TRUSTED * inner(&before, &before) {
-            return None;
-        }
-        let mut multipliers = lambda.to_vec();
-        if !pulls {
-            multipliers.fill(0.0);
-            active.iter().zip(&solution.multipliers).for_each(|(i, l)| multipliers[*i] = l.max(0.0));
-        }
-        return Some(Unilateral { y: solution.y, multipliers, converged: true });
-    }
-    None
+    let converged = state.complementarity() <= TRUSTED * size;
+    state.finished(converged)
 }
 
 struct Multipliers {
-    y: Vec<Vec3>,
     lambda: Vec<f64>,
+    /// `A^T lambda`
+    y: Vec<Vec3>,
+    /// `demand - A y`
+    left: Vec<f64>,
 }
 
 impl Multipliers {
-    /// Largest component of `min(lambda, A y - demand)` at `y = A^T lambda`.
-    fn complementarity(&self, rows: &ZoneRows, demand: &[f64]) -> f64 {
-        let y = rows.transposed_product(&self.lambda);
-        let of = |i: usize| self.lambda[i].min(rows.product(i, &y) - demand[i]).abs();
-        (0..rows.len()).map(of).fold(0.0, f64::max)
+    fn new(rows: &ZoneRows, demand: &[f64]) -> Multipliers {
+        Multipliers { lambda: vec![0.0; rows.len()], y: vec![[0.0; 3]; rows.width], left: demand.to_vec() }
     }
 
-    /// Minimises `|y|²/2 + sum max(0, lambda + sigma (demand - A y))²/(2 sigma)` over y; Newton steps taken.
-    fn minimise(&mut self, rows: &ZoneRows, demand: &[f64], sigma: f64, steps_max: usize, tolerance: f64) -> usize {
-        for step in 0..steps_max {
-            let pushes = self.pushes(rows, demand, sigma, &self.y);
-            let mut gradient = self.y.clone();
-            for (i, z) in pushes.iter().enumerate().filter(|(_, z)| **z > 0.0) {
-                rows.add_row(i, -z, &mut gradient);
+    /// Largest component of `min(lambda, A y - demand)`.
+    fn complementarity(&self) -> f64 {
+        self.lambda.iter().zip(&self.left).fold(0.0, |m, (l, left)| m.max(l.min(-left).abs()))
+    }
+
+    /// One update of the multipliers: to `z = max(0, lambda + sigma (demand - A (y + d)))` where d minimises
+    /// `|y + d|²/2 + |z|²/(2 sigma)`; Newton steps taken.
+    fn update(
+        &mut self,
+        rows: &ZoneRows,
+        demand: &[f64],
+        sigma: f64,
+        steps_max: usize,
+        tolerance: f64,
+        factor: &mut Option<ZoneFactor>,
+    ) -> usize {
+        let mut change = vec![[0.0; 3]; rows.width];
+        // lambda + sigma (demand - A (y + d)), pushing or not.
+        let mut pushes: Vec<f64> = self.lambda.iter().zip(&self.left).map(|(l, left)| l + sigma * left).collect();
+        let mut steps = 0;
+        while steps < steps_max {
+            // y is A^T lambda: what is left of the gradient.
+            let mut gradient = change.clone();
+            let mut active = Vec::new();
+            for (i, push) in pushes.iter().enumerate() {
+                if *push > 0.0 {
+                    active.push(i);
+                }
+                let gained = push.max(0.0) - self.lambda[i];
+                if gained != 0.0 {
+                    rows.add_row(i, -gained, &mut gradient);
+                }
             }
-            // Below the rounding of the pushes there is nothing to gain.
-            let rounding = 4.0 * f64::EPSILON * (1.0 + sigma) * inner(&self.y, &self.y).sqrt();
+            let size = inner(&change, &change).sqrt();
+            let rounding = 4.0 * f64::EPSILON * (1.0 + sigma) * size;
             if inner(&gradient, &gradient).sqrt() <= tolerance.max(rounding) {
-                return step;
+                break;
             }
-            let active: Vec<usize> = (0..rows.len()).filter(|i| pushes[*i] > 0.0).collect();
-            let direction = newton_direction(rows, &active, sigma, &gradient);
-            if !self.search(rows, demand, sigma, &direction, inner(&gradient, &direction)) {
-                return step + 1;
+            steps += 1;
+            let direction = newton_direction(rows, &active, sigma, &gradient, factor);
+            let speeds: Vec<f64> = (0..rows.len()).map(|i| -sigma * rows.product(i, &direction)).collect();
+            let slope = inner(&gradient, &direction);
+            let way = lowest(&pushes, &speeds, sigma, slope, inner(&direction, &direction));
+            if way == 0.0 {
+                break;
             }
+            change.iter_mut().zip(&direction).for_each(|(c, d)| *c = add_scaled(*c, way, *d));
+            pushes.iter_mut().zip(&speeds).for_each(|(push, speed)| *push += way * speed);
         }
-        steps_max
+        self.lambda.iter_mut().zip(&pushes).for_each(|(l, push)| *l = push.max(0.0));
+        self.y = rows.transposed_product(&self.lambda);
+        self.left = (0..rows.len()).map(|i| demand[i] - rows.product(i, &self.y)).collect();
+        steps
     }
 
-    /// `max(0, lambda + sigma (demand - A y))`
-    fn pushes(&self, rows: &ZoneRows, demand: &[f64], sigma: f64, y: &[Vec3]) -> Vec<f64> {
-        let of = |i: usize| (self.lambda[i] + sigma * (demand[i] - rows.product(i, y))).max(0.0);
-        (0..rows.len()).map(of).collect()
+    fn finished(self, converged: bool) -> Unilateral {
+        Unilateral { y: self.y, multipliers: self.lambda, converged }
     }
+}
 
-    fn value(&self, rows: &ZoneRows, demand: &[f64], sigma: f64, y: &[Vec3]) -> f64 {
-        let squares: f64 = self.pushes(rows, demand, sigma, y).iter().map(|z| z * z).sum();
-        0.5 * inner(y, y) + 0.5 * squares / sigma
-    }
-
-    /// Goes along a direction of descent of the given slope as far as the value falls; whether it did.
-    fn search(&mut self, rows: &ZoneRows, demand: &[f64], sigma: f64, direction: &[Vec3], slope: f64) -> bool {
-        let start = self.value(rows, demand, sigma, &self.y);
-        let mut share = 1.0;
-        for _ in 0..HALVINGS {
-            let there: Vec<Vec3> = self.y.iter().zip(direction).map(|(y, d)| add_scaled(*y, share, *d)).collect();
-            if self.value(rows, demand, sigma, &there) < start + 1e-4 * share * slope {
-                self.y = there;
-                return true;
-            }
-            share *= 0.5;
+/// How far to go where the function is lowest along a direction; 0 unless it falls.
+///
+/// Its slope, `slope` at first, grows by `square` and by the squares of the speeds of what pushes, over sigma: piecewise
+/// linear, with a bend where a row starts or ends to push. Cost: a sort of the bends.
+fn lowest(pushes: &[f64], speeds: &[f64], sigma: f64, slope: f64, square: f64) -> f64 {
+    let mut bends = Vec::new();
+    let mut curvature = square;
+    for (push, speed) in pushes.iter().zip(speeds) {
+        let bend = speed * speed / sigma;
+        if *push > 0.0 {
+            curvature += bend;
         }
-        false
+        if *push > 0.0 && *speed < 0.0 {
+            bends.push((-push / speed, -bend));
+        } else if *push <= 0.0 && *speed > 0.0 {
+            bends.push((-push / speed, bend));
+        }
     }
-
-    fn finished(self, rows: &ZoneRows, converged: bool) -> Unilateral {
-        Unilateral { y: rows.transposed_product(&self.lambda), multipliers: self.lambda, converged }
+    bends.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let (mut at, mut slope) = (0.0, slope);
+    for (bend, more) in bends {
+        let there = slope + (bend - at) * curvature;
+        if there >= 0.0 {
+            break;
+        }
+        (at, slope) = (bend, there);
+        curvature = (curvature + more).max(square);
     }
+    if slope < 0.0 && curvature > 0.0 { at - slope / curvature } else { at }
 }
 
 /// `-(I + sigma A_S^T A_S)^-1 gradient`
-fn newton_direction(rows: &ZoneRows, active: &[usize], sigma: f64, gradient: &[Vec3]) -> Vec<Vec3> {
-    if rows.len() <= DENSE_ROWS
-        && let Some(direction) = by_factor(rows, active, sigma, gradient)
+fn newton_direction(
+    rows: &ZoneRows,
+    active: &[usize],
+    sigma: f64,
+    gradient: &[Vec3],
+    factor: &mut Option<ZoneFactor>,
+) -> Vec<Vec3> {
+    let mut direction: Vec<Vec3> = gradient.iter().map(|g| scale(-1.0, *g)).collect();
+    if let Some(factor) = factor
+        && factor.assign(rows, active, sigma)
     {
+        factor.solve(&mut direction);
         return direction;
     }
-    by_conjugate_gradients(rows, active, sigma, gradient)
+    by_conjugate_gradients(rows, active, sigma, direction)
 }
 
-/// By a factor of `A_S A_S^T + I/sigma`, which is as small as there are rows.
-fn by_factor(rows: &ZoneRows, active: &[usize], sigma: f64, gradient: &[Vec3]) -> Option<Vec<Vec3>> {
-    let n = active.len();
-    let entry = |i: usize, j: usize| {
-        let shift = if i == j { 1.0 / sigma } else { 0.0 };
-        rows.inner_product(active[i.min(j)], active[i.max(j)]) + shift
-    };
-    let factor = DMatrix::from_fn(n, n, entry).cholesky()?;
-    let load = factor.solve(&DVector::from_fn(n, |i, _| rows.product(active[i], gradient)));
-    let mut direction: Vec<Vec3> = gradient.iter().map(|g| scale(-1.0, *g)).collect();
-    active.iter().zip(load.iter()).for_each(|(i, l)| rows.add_row(*i, *l, &mut direction));
-    Some(direction)
-}
-
-fn by_conjugate_gradients(rows: &ZoneRows, active: &[usize], sigma: f64, gradient: &[Vec3]) -> Vec<Vec3> {
+fn by_conjugate_gradients(rows: &ZoneRows, active: &[usize], sigma: f64, right: Vec<Vec3>) -> Vec<Vec3> {
     let apply = |d: &[Vec3]| {
         let mut out = d.to_vec();
         active.iter().for_each(|i| rows.add_row(*i, sigma * rows.product(*i, d), &mut out));
         out
     };
-    let mut direction = vec![[0.0; 3]; gradient.len()];
-    let mut residual: Vec<Vec3> = gradient.iter().map(|g| scale(-1.0, *g)).collect();
+    let mut direction = vec![[0.0; 3]; right.len()];
+    let mut residual = right;
     let mut search = residual.clone();
     let mut square = inner(&residual, &residual);
     let end = GRADIENT_TOLERANCE * GRADIENT_TOLERANCE * square;
-    for _ in 0..GRADIENT_STEPS.min(8 * gradient.len() + 8) {
+    for _ in 0..GRADIENT_STEPS.min(8 * residual.len() + 8) {
         if square <= end {
             break;
         }

@@ -2,6 +2,7 @@
 
 use super::minimum_norm::minimum_norm;
 use super::unilateral_projection::unilateral;
+use super::zone_factor::ZoneFactor;
 use super::zone_friction::{ContactFriction, zone_friction};
 use super::zone_rows::{ZoneBlocks, ZoneRows, inner};
 use crate::constraint::{Metric, RowSet};
@@ -52,6 +53,7 @@ pub fn project_zone(
     let demand: Vec<f64> = of.iter().zip(&normals.scales).map(|(row, s)| s * rows.normal_targets[*row]).collect();
     let mut zone = Zone {
         y: vec![[0.0; 3]; normals.width],
+        factor: ZoneFactor::new(&normals),
         normals,
         demand,
         unilateral: response.fail_safe != FailSafe::InelasticProjection,
@@ -88,6 +90,8 @@ pub fn project_zone(
 /// A projection under way.
 struct Zone {
     normals: ZoneRows,
+    /// Of the normals, unless that would cost too much.
+    factor: Option<ZoneFactor>,
     /// Wanted `A y`.
     demand: Vec<f64>,
     /// Response so far.
@@ -102,7 +106,7 @@ impl Zone {
         let left: Vec<f64> =
             (0..self.demand.len()).map(|i| self.demand[i] - self.normals.product(i, &self.y)).collect();
         let (y, multipliers) = if self.unilateral {
-            let solution = unilateral(&self.normals, &left);
+            let solution = unilateral(&self.normals, &left, &mut self.factor);
             self.result.converged = solution.converged;
             (solution.y, solution.multipliers)
         } else {

@@ -104,6 +104,17 @@ impl ZoneRows {
         (self.offsets[i]..self.offsets[i + 1]).map(|k| dot(self.entries[k], y[self.columns[k]])).sum()
     }
 
+    /// Columns and entries of a row.
+    #[inline]
+    pub fn row(&self, i: usize) -> impl ExactSizeIterator<Item = (usize, Vec3)> + '_ {
+        (self.offsets[i]..self.offsets[i + 1]).map(|k| (self.columns[k], self.entries[k]))
+    }
+
+    /// Number of entries of all rows.
+    pub fn entry_count(&self) -> usize {
+        self.entries.len()
+    }
+
     /// `y += factor A_i`
     #[inline]
     pub fn add_row(&self, i: usize, factor: f64, y: &mut [Vec3]) {
