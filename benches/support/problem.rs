@@ -97,6 +97,7 @@ impl Problem {
             matrix: &self.matrix,
             inverse_diagonal: &self.inverse_diagonal,
             rows: &self.rows,
+            translations: None,
             velocity_scale: self.velocity_scale(),
         }
     }

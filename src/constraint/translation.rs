@@ -61,19 +61,22 @@ impl Translations {
         self.inverse_masses.iter_mut().for_each(|m| *m = inverse(m).unwrap_or(ZERO_MATRIX));
     }
 
-    /// Adds to each component's `dv` the translation that makes `A dv` and the impulses sum up to the same; the largest
-    /// one `[m/s]`.
+    /// The translation of each component that makes `product`, which is `A dv`, and the impulses sum up to the same
+    /// `[m/s]`. Cost: a pass over the blocks.
     ///
     /// It is the correction that brings `dv` closest to the solution of `A dv = impulses` in the norm of A. Stiffness
     /// does not feel a translation of the whole, so that what the masses gain is then what contacts gave, to rounding.
-    /// Cost: one product with A.
-    pub fn balance(&self, matrix: &BlockMatrix, impulses: &[Vec3], dv: &mut [Vec3]) -> f64 {
+    pub fn missing(&self, impulses: &[Vec3], product: &[Vec3]) -> Vec<Vec3> {
         let mut missing = vec![[0.0; 3]; self.inverse_masses.len()];
         for (row, component) in self.component.iter().enumerate().filter(|(_, c)| **c != NONE) {
             let sum = &mut missing[*component as usize];
-            *sum = add(*sum, sub(impulses[row], matrix.row_product(row, dv)));
+            *sum = add(*sum, sub(impulses[row], product[row]));
         }
-        let shifts: Vec<Vec3> = missing.iter().zip(&self.inverse_masses).map(|(r, m)| mat_vec(m, *r)).collect();
+        missing.iter().zip(&self.inverse_masses).map(|(r, m)| mat_vec(m, *r)).collect()
+    }
+
+    /// Adds the translation of its component to each block; returns the largest.
+    pub fn translate(&self, shifts: &[Vec3], dv: &mut [Vec3]) -> f64 {
         for (v, component) in dv.iter_mut().zip(&self.component).filter(|(_, c)| **c != NONE) {
             *v = add(*v, shifts[*component as usize]);
         }
@@ -125,14 +128,18 @@ mod tests {
         modes.update(&a);
         let impulses = [[1.0, 0.0, 2.0], [0.5, 0.0, 0.0], [7.0; 3], [0.0, -3.0, 0.0], [0.0; 3]];
         let mut dv = vec![[0.1, 0.2, 0.3], [0.0; 3], [9.0; 3], [-0.4, 0.0, 0.0], [1.0, 1.0, 1.0]];
-        let largest = modes.balance(&a, &impulses, &mut dv);
+        let balance = |impulses: &[Vec3], dv: &mut [Vec3]| {
+            let product: Vec<Vec3> = (0..5).map(|row| a.row_product(row, dv)).collect();
+            modes.translate(&modes.missing(impulses, &product), dv)
+        };
+        let largest = balance(&impulses, &mut dv);
         // The free chain has masses 2 and 3; its springs cancel.
         let gained = add(scale(2.0, dv[0]), scale(3.0, dv[3]));
         assert!(norm(sub(gained, [1.0, -3.0, 2.0])) < 1e-14, "{gained:?}");
         let anchored = add(a.row_product(1, &dv), a.row_product(4, &dv));
         assert!(norm(sub(anchored, [0.5, 0.0, 0.0])) < 1e-14, "{anchored:?}");
         assert_eq!(dv[2], [9.0; 3], "what is coupled to nothing stays");
-        assert!(largest > 0.0 && modes.balance(&a, &impulses, &mut dv) < 1e-15);
+        assert!(largest > 0.0 && balance(&impulses, &mut dv) < 1e-15);
     }
 
     #[test]
@@ -141,7 +148,7 @@ mod tests {
         let mut modes = Translations::new(&a, &[true, true, true, false, true]);
         modes.update(&a);
         let mut dv = vec![[0.0; 3]; 5];
-        modes.balance(&a, &[[7.0, 0.0, 0.0]; 5], &mut dv);
+        modes.translate(&modes.missing(&[[7.0, 0.0, 0.0]; 5], &[[0.0; 3]; 5]), &mut dv);
         assert_eq!(dv[3], [0.0; 3]);
         assert!((dv[0][0] - 1.0).abs() < 1e-15, "7 over its own diagonal block");
     }

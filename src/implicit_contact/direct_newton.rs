@@ -136,7 +136,13 @@ mod tests {
         let matrix = BlockMatrix::from_diagonal(&diagonal);
         let mut inverse: Vec<Mat3> = (0..6).map(|b| mat_scale(1.0 / (1.0 + 0.3 * f64::from(b)), &IDENTITY)).collect();
         inverse[4] = [[0.0; 3]; 3];
-        let problem = ContactProblem { matrix: &matrix, inverse_diagonal: &inverse, rows: &rows, velocity_scale: 1.0 };
+        let problem = ContactProblem {
+            matrix: &matrix,
+            inverse_diagonal: &inverse,
+            rows: &rows,
+            translations: None,
+            velocity_scale: 1.0,
+        };
         let mut direct = DirectNewton::new(&problem).expect("a small system");
         let stiffness = [[[40.0, 3.0, 0.0], [3.0, 70.0, 5.0], [0.0, 5.0, 90.0]]; 3];
         // The second contact is open in the second solve: nothing of the first may be left.

@@ -219,6 +219,7 @@ fn solve_round(
         matrix: &metric.matrix,
         inverse_diagonal: &metric.inverse_diagonal,
         rows: &built.rows,
+        translations: Some(&metric.translations),
         velocity_scale,
     };
     let report = if velocity_scale > 0.0 {
@@ -276,10 +277,12 @@ fn solve_balanced(
 ) -> SolverReport {
     let mut settings = *settings;
     let mut total = SolverReport::default();
+    let mut product = vec![[0.0; 3]; dv.len()];
     for _ in 0..BALANCES_MAX {
         let report = solve(problem, impulses, dv, &settings, scratch, par);
         let given = block_impulses(dv.len(), built, impulses);
-        let moved = metric.translations.balance(problem.matrix, &given, dv);
+        problem.matrix.product(dv, &mut product, par);
+        let moved = metric.translations.translate(&metric.translations.missing(&given, &product), dv);
         // A row weighs both its sides with one at most.
         let off = 2.0 * moved / problem.velocity_scale;
         total = SolverReport {

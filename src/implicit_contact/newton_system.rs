@@ -4,7 +4,7 @@
 use super::incidence::Incidence;
 use super::packed_contacts::Contact;
 use super::residuals::{Task, Work};
-use super::single_pass::{General, NONE, general, seen};
+use super::single_pass::{GeneralRows, NONE, seen};
 use crate::linalg::power_of_two;
 use crate::math::simd::Quad;
 use crate::math::{Mat3, Vec3, inverse, mat_add};
@@ -50,7 +50,7 @@ pub(super) struct NewtonSystem {
     /// The acting contacts of each block.
     pub incidence: Incidence,
     resisting: Vec<Resisting>,
-    general: Vec<General>,
+    general: GeneralRows,
     /// Columns of the inverse diagonal blocks of the system.
     preconditioner: Vec<[Quad; 3]>,
     nodes: Vec<Node>,
@@ -144,8 +144,7 @@ impl NewtonSystem {
                 general: NONE,
             };
             if contact.general {
-                record.general = self.general.len() as u32;
-                self.general.push(general(rows, contact.source as usize));
+                record.general = self.general.push(rows, contact.source as usize);
             }
             self.resisting.push(record);
         }
@@ -166,7 +165,7 @@ impl NewtonSystem {
 
     /// `image := (A + C^T E C) direction`; returns `direction . image`.
     fn apply(&mut self, task: &Task) -> f64 {
-        let (resisting, general, direction) = (&self.resisting[..], &self.general[..], &self.direction[..]);
+        let (resisting, general, direction) = (&self.resisting[..], &self.general, &self.direction[..]);
         task.par.map_into(&mut self.forces, |k| resisting[k].force(general, direction));
         let (incidence, forces, single) = (&self.incidence, &self.forces[..], task.single);
         task.par.update_and_sum(&mut self.image, |start, part| {
@@ -199,9 +198,9 @@ impl NewtonSystem {
 
 impl Resisting {
     #[inline(always)]
-    fn force(&self, general: &[General], v: &[Quad]) -> Quad {
+    fn force(&self, general: &GeneralRows, v: &[Quad]) -> Quad {
         let simple = self.general == NONE;
-        let u = if simple { seen(&self.blocks, &self.weights, v) } else { general[self.general as usize].seen(v) };
+        let u = if simple { seen(&self.blocks, &self.weights, v) } else { general.seen(self.general, v) };
         Quad::combine(&self.stiffness, u)
     }
 }

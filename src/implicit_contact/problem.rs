@@ -10,7 +10,7 @@ use super::residuals::{Iterate, MeasureBuffers, Task, Work, contact_residuals, m
 use super::stop_test::{Ending, Run};
 use super::velocity_error::velocity_error;
 use super::{accelerated_relaxation, augmented_lagrangian, block_diagonal, full_anticipation, splitting_start};
-use crate::constraint::RowSet;
+use crate::constraint::{RowSet, Translations};
 use crate::linalg::{BlockMatrix, SinglePrecision};
 use crate::math::{Mat3, Vec3, is_finite, mat_vec};
 use crate::model::{Settings, SolverChoice};
@@ -33,6 +33,8 @@ pub struct ContactProblem<'a> {
     pub inverse_diagonal: &'a [Mat3],
     /// Contact rows.
     pub rows: &'a RowSet,
+    /// Translations in which the caller balances momentum: a solve goes on until its rows hold after that too.
+    pub translations: Option<&'a Translations>,
     /// Scale of velocities that residuals are relative to: the largest of `|v*|` `[m/s]`.
     pub velocity_scale: f64,
 }

@@ -20,6 +20,7 @@ pub(super) const NONE: u32 = u32::MAX;
 /// The normal velocity of one contact.
 #[derive(Clone, Copy, Debug, Default)]
 struct Screen {
+    /// `NONE` first where the entries are those of the row.
     blocks: [u32; 4],
     weights: [f32; 4],
     /// Normal, and the target of the normal velocity.
@@ -52,9 +53,11 @@ struct Record {
     base: u32,
 }
 
-/// Entries of a contact with more than four, or with angular ones.
+/// Entries of contacts with more than four, or with angular ones, rounded.
 #[derive(Clone, Debug, Default)]
-pub(super) struct General {
+pub(super) struct GeneralRows {
+    /// Ends of the linear and the angular entries of each.
+    ends: Vec<[u32; 2]>,
     linear: Vec<(u32, f32)>,
     angular: Vec<(u32, Quad)>,
 }
@@ -67,7 +70,7 @@ pub(super) struct SinglePass<'a> {
     /// Contacts that were near at some time, and the record of each contact.
     records: Vec<Record>,
     record_of: Vec<u32>,
-    general: Vec<General>,
+    general: GeneralRows,
     /// Records to relax, by contact.
     near: Vec<u32>,
     /// Columns of the inverse blocks of the metric, and the same in double precision.
@@ -86,10 +89,9 @@ impl<'a> SinglePass<'a> {
         let velocity = power_of_two(velocity);
         let screens = packed.contacts.iter().map(|contact| {
             let n = contact.frame[0];
-            // What the screen cannot see is always near.
-            let target = if contact.general { f32::NEG_INFINITY } else { (contact.target[0] / velocity) as f32 };
-            let plane = Quad::new([n[0] as f32, n[1] as f32, n[2] as f32, target]);
-            Screen { blocks: contact.blocks, weights: contact.weights.map(|w| w as f32), plane }
+            let plane = Quad::new([n[0] as f32, n[1] as f32, n[2] as f32, (contact.target[0] / velocity) as f32]);
+            let blocks = if contact.general { [NONE; 4] } else { contact.blocks };
+            Screen { blocks, weights: contact.weights.map(|w| w as f32), plane }
         });
         SinglePass {
             packed,
@@ -97,7 +99,7 @@ impl<'a> SinglePass<'a> {
             screens: screens.collect(),
             records: Vec::new(),
             record_of: vec![NONE; packed.contacts.len()],
-            general: Vec::new(),
+            general: GeneralRows::default(),
             near: Vec::new(),
             inverse: Vec::new(),
             exact_inverse: Vec::new(),
@@ -189,8 +191,7 @@ impl<'a> SinglePass<'a> {
             };
             record.normal[3] = contact.friction as f32;
             if contact.general {
-                record.general = self.general.len() as u32;
-                self.general.push(general(self.rows, contact.source as usize));
+                record.general = self.general.push(self.rows, contact.source as usize);
             }
             let record = self.measured(record);
             self.records.push(record);
@@ -201,18 +202,38 @@ impl<'a> SinglePass<'a> {
         r
     }
 
-    /// Finds the contacts that press, or whose law the velocities `v` (not increments) violate. Contacts with more than four entries are always near.
+    /// Finds the contacts that press, or whose law the velocities `v` (not increments) violate.
     pub fn screen(&mut self, v: &[Quad], base: &[Vec3]) -> u64 {
         self.near.clear();
         for c in 0..self.screens.len() {
             let r = self.record_of[c];
             let presses = r != NONE && self.records[r as usize].pressure > 0.0;
-            if presses || self.screens[c].normal_velocity(v) < 0.0 {
+            if presses || self.normal_velocity(c, v) < 0.0 {
                 let r = self.record(c, base);
                 self.near.push(r as u32);
             }
         }
         self.screens.len() as u64
+    }
+
+    /// Normal velocity of contact `c`, target included.
+    #[inline(always)]
+    fn normal_velocity(&self, c: usize, v: &[Quad]) -> f32 {
+        let screen = &self.screens[c];
+        if screen.blocks[0] != NONE {
+            return screen.normal_velocity(seen(&screen.blocks, &screen.weights, v));
+        }
+        let (rows, i) = (self.rows, self.packed.contacts[c].source as usize);
+        let linear = rows.offsets[i] as usize..rows.offsets[i + 1] as usize;
+        let angular = rows.angular_offsets[i] as usize..rows.angular_offsets[i + 1] as usize;
+        let mut u = Quad::default();
+        for k in linear {
+            u = u.add_scaled(rows.weights[k] as f32, v[rows.blocks[k] as usize]);
+        }
+        for a in &rows.angular[angular] {
+            u = u + v[a.block as usize].cross(Quad::round(a.lever, 1.0));
+        }
+        screen.normal_velocity(u)
     }
 
     /// Puts the multipliers of all records into `p`, in units of the problem and within their limits in f64 too.
@@ -240,8 +261,8 @@ impl<'a> SinglePass<'a> {
 
 impl Screen {
     #[inline(always)]
-    fn normal_velocity(&self, v: &[Quad]) -> f32 {
-        let n = (seen(&self.blocks, &self.weights, v) * self.plane).lanes();
+    fn normal_velocity(&self, seen: Quad) -> f32 {
+        let n = (seen * self.plane).lanes();
         (n[0] + n[1]) + (n[2] + self.plane.lanes()[3])
     }
 }
@@ -256,7 +277,7 @@ pub(super) fn seen(blocks: &[u32; 4], weights: &[f32; 4], v: &[Quad]) -> Quad {
 
 struct Sweep<'a> {
     records: &'a mut [Record],
-    general: &'a [General],
+    general: &'a GeneralRows,
     near: &'a [u32],
     inverse: &'a [[Quad; 3]],
     u: &'a mut [Quad],
@@ -280,9 +301,9 @@ impl Kernel for Sweep<'_> {
 
 impl Record {
     #[inline(always)]
-    fn relax<const DISC: bool>(&mut self, general: &[General], inverse: &[[Quad; 3]], u: &mut [Quad]) {
+    fn relax<const DISC: bool>(&mut self, general: &GeneralRows, inverse: &[[Quad; 3]], u: &mut [Quad]) {
         let simple = self.general == NONE;
-        let seen = if simple { seen(&self.blocks, &self.weights, u) } else { general[self.general as usize].seen(u) };
+        let seen = if simple { seen(&self.blocks, &self.weights, u) } else { general.seen(self.general, u) };
         let before = self.p;
         let w = (Quad::combine(&self.columns, seen) + self.target).lanes();
         if self.pressure == 0.0 && w[0] >= 0.0 {
@@ -297,7 +318,7 @@ impl Record {
                 u[b] = u[b].add_scaled(w, Quad::combine(&inverse[b], f));
             }
         } else {
-            general[self.general as usize].respond(inverse, f, u);
+            general.respond(self.general, inverse, f, u);
         }
     }
 
@@ -333,29 +354,53 @@ impl Record {
     }
 }
 
-/// The entries of row `i`, rounded.
-pub(super) fn general(rows: &RowSet, i: usize) -> General {
-    let linear = rows.offsets[i] as usize..rows.offsets[i + 1] as usize;
-    let angular = rows.angular_offsets[i] as usize..rows.angular_offsets[i + 1] as usize;
-    General {
-        linear: linear.map(|k| (rows.blocks[k], rows.weights[k] as f32)).collect(),
-        angular: rows.angular[angular].iter().map(|a| (a.block, Quad::round(a.lever, 1.0))).collect(),
+impl GeneralRows {
+    /// No rows.
+    pub fn clear(&mut self) {
+        self.ends.clear();
+        self.linear.clear();
+        self.angular.clear();
     }
-}
 
-impl General {
+    /// Adds the entries of row `i`; returns their number here.
+    pub fn push(&mut self, rows: &RowSet, i: usize) -> u32 {
+        let linear = rows.offsets[i] as usize..rows.offsets[i + 1] as usize;
+        let angular = rows.angular_offsets[i] as usize..rows.angular_offsets[i + 1] as usize;
+        self.linear.extend(linear.map(|k| (rows.blocks[k], rows.weights[k] as f32)));
+        self.angular.extend(rows.angular[angular].iter().map(|a| (a.block, Quad::round(a.lever, 1.0))));
+        self.ends.push([self.linear.len() as u32, self.angular.len() as u32]);
+        self.ends.len() as u32 - 1
+    }
+
+    #[inline(always)]
+    fn entries(&self, row: u32) -> (&[(u32, f32)], &[(u32, Quad)]) {
+        let row = row as usize;
+        let ([l0, a0], [l1, a1]) = (if row == 0 { [0, 0] } else { self.ends[row - 1] }, self.ends[row]);
+        (&self.linear[l0 as usize..l1 as usize], &self.angular[a0 as usize..a1 as usize])
+    }
+
     /// `W v`
-    pub fn seen(&self, u: &[Quad]) -> Quad {
-        let linear = self.linear.iter().fold(Quad::default(), |s, (b, w)| s.add_scaled(*w, u[*b as usize]));
-        self.angular.iter().fold(linear, |s, (b, lever)| s + u[*b as usize].cross(*lever))
+    #[inline(always)]
+    pub fn seen(&self, row: u32, u: &[Quad]) -> Quad {
+        let (linear, angular) = self.entries(row);
+        let mut sum = Quad::default();
+        for (b, w) in linear {
+            sum = sum.add_scaled(*w, u[*b as usize]);
+        }
+        for (b, lever) in angular {
+            sum = sum + u[*b as usize].cross(*lever);
+        }
+        sum
     }
 
-    fn respond(&self, inverse: &[[Quad; 3]], f: Quad, u: &mut [Quad]) {
-        for (b, w) in &self.linear {
+    #[inline(always)]
+    fn respond(&self, row: u32, inverse: &[[Quad; 3]], f: Quad, u: &mut [Quad]) {
+        let (linear, angular) = self.entries(row);
+        for (b, w) in linear {
             let b = *b as usize;
             u[b] = u[b].add_scaled(*w, Quad::combine(&inverse[b], f));
         }
-        for (b, lever) in &self.angular {
+        for (b, lever) in angular {
             let b = *b as usize;
             u[b] = u[b] + Quad::combine(&inverse[b], lever.cross(f));
         }

@@ -102,6 +102,7 @@ impl Made {
             matrix: &self.matrix,
             inverse_diagonal: &self.inverse,
             rows: &self.rows,
+            translations: None,
             velocity_scale: self.velocities.iter().map(|v| norm(*v)).fold(0.0, f64::max),
         }
     }

@@ -239,6 +239,7 @@ impl Quad {
     }
 
     /// The cross product.
+    #[inline(always)]
     pub fn cross(self, other: Quad) -> Quad {
         let (a, b) = (self.lanes(), other.lanes());
         Quad::new([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0], 0.0])
