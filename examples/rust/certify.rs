@@ -5,57 +5,23 @@
 
 use signorini::detection::Primitives;
 use signorini::detection::intersection::find;
-use signorini::math::Vec3;
 use signorini::mesh::Surface;
 use signorini::parallel::Par;
 use std::process::ExitCode;
 
+#[allow(dead_code)]
+mod obj_file;
+
 /// Witnesses printed per file.
 const SHOWN: usize = 5;
 
-/// Vertices and faces of an OBJ file; polygons are cut into fans, everything else is passed over.
-///
-/// Errors: line number (from 1; 0 for the whole file) and what is wrong there.
+/// The surface of an OBJ file. Errors: line number (from 1; 0 for the whole file) and what is wrong there.
 fn read_obj(text: &str) -> Result<Surface, (usize, String)> {
-    let (mut positions, mut faces, mut lines) = (Vec::<Vec3>::new(), Vec::new(), Vec::new());
-    for (index, line) in text.lines().enumerate() {
-        let fail = |message: String| (index + 1, message);
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => {
-                let mut x = [0.0; 3];
-                for coordinate in &mut x {
-                    let word = words.next().ok_or_else(|| fail("a vertex needs three coordinates".to_string()))?;
-                    *coordinate = word.parse().map_err(|_| fail(format!("'{word}' is not a number")))?;
-                }
-                positions.push(x);
-            }
-            Some("f") => {
-                let corners = words.map(|word| corner(word, positions.len())).collect::<Result<Vec<u32>, String>>();
-                let corners = corners.map_err(fail)?;
-                if corners.len() < 3 {
-                    return Err(fail("a face needs three vertices".to_string()));
-                }
-                for k in 2..corners.len() {
-                    faces.push([corners[0], corners[k - 1], corners[k]]);
-                    lines.push(index + 1);
-                }
-            }
-            _ => {}
-        }
-    }
-    Surface::from_triangles(positions, faces).map_err(|error| {
-        let line = if error.message.starts_with("a face") { lines[error.index] } else { 0 };
+    let obj = obj_file::parse(text)?;
+    Surface::from_triangles(obj.positions, obj.faces).map_err(|error| {
+        let line = if error.message.starts_with("a face") { obj.face_lines[error.index] } else { 0 };
         (line, error.to_string())
     })
-}
-
-/// Vertex index of a face corner `v`, `v/t` or `v/t/n`, counted from 1, or backwards from -1.
-fn corner(word: &str, count: usize) -> Result<u32, String> {
-    let number = word.split('/').next().unwrap_or(word);
-    let value: i64 = number.parse().map_err(|_| format!("'{word}' is not a vertex"))?;
-    let index = if value < 0 { value + count as i64 } else { value - 1 };
-    u32::try_from(index).map_err(|_| format!("'{word}' is not a vertex"))
 }
 
 /// Prints the findings for one file; whether it is clean.

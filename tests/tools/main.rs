@@ -3,6 +3,7 @@
 
 mod ccd_check;
 mod certify;
+mod clean_trajectory;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
