@@ -4,8 +4,9 @@
     python ci/pictures.py RUN [--count 6] ...
 
 RUN is a folder that `signorini-run --out` wrote: RUN/sheet.png shows some of its frames, evenly spaced, RUN/stats.png
-plots its steps. Objects named `cloth*`, and surfaces that are open, are drawn as two-sided cloth, objects named `ground`
-are replaced by a floor (give --floor; a run knows its own), all others as solids. Needs `pip install pyvista`.
+plots its steps; half-spaces and the camera are those of its scene. Objects named `cloth*`, and surfaces that are open, are
+drawn as two-sided cloth, open surfaces of prescribed motion as glass, objects named `ground` are replaced by a floor (give
+--floor; a run knows its own), all others as solids. Needs `pip install pyvista`.
 """
 
 import argparse
@@ -23,6 +24,7 @@ SOLIDS = ["#b9cbd6", "#6f8f72", "#b8a58f"]
 FLOOR = "#dcd8d0"
 SHADOW = "#b9b4ab"
 GRID = "#d0cbc2"
+GLASS = "#7d94a3"
 SKY_TOP, SKY_BOTTOM = "#dfe7ee", "#f6f3ee"
 
 
@@ -47,9 +49,9 @@ def read_obj(path):
     return result
 
 
-def turned(scene):
-    """The frame with z up turned so that y is up."""
-    return [(name, points[:, [0, 2, 1]] * [1.0, 1.0, -1.0], faces) for name, points, faces in scene]
+def turned(points):
+    """Points of a scene with z up turned so that y is up."""
+    return np.asarray(points)[..., [0, 2, 1]] * [1.0, 1.0, -1.0]
 
 
 def is_open(faces):
@@ -100,6 +102,31 @@ def add_grid(plotter, size, height):
             plotter.add_mesh(line, color=GRID, line_width=2, lighting=False)
 
 
+def add_glass(plotter, points, faces):
+    """A surface that one sees through, with its outline."""
+    mesh = surface(points, faces)
+    plotter.add_mesh(mesh, color=GLASS, opacity=0.22, ambient=0.4, diffuse=0.6, smooth_shading=False)
+    edges = mesh.extract_feature_edges(boundary_edges=True, feature_edges=False, manifold_edges=False)
+    if edges.n_points:
+        plotter.add_mesh(edges, color=GLASS, line_width=3, lighting=False)
+
+
+def add_plane(plotter, normal, offset, points, size):
+    """The part of a half-space's plane under what is drawn, a hair below it, with lines across."""
+    normal = np.asarray(normal)
+    across = np.cross(normal, [0.0, 0.0, 1.0] if abs(normal[2]) < 0.9 else [1.0, 0.0, 0.0])
+    across /= np.linalg.norm(across)
+    along = np.cross(across, normal)
+    origin = (offset - 2e-3 * size) * normal
+    (u0, u1), (v0, v1) = [(x.min() - 0.15 * size, x.max() + 0.15 * size) for x in (points @ across, points @ along)]
+    corner = lambda u, v: origin + u * across + v * along
+    quad = np.array([corner(u0, v0), corner(u1, v0), corner(u1, v1), corner(u0, v1)])
+    plotter.add_mesh(surface(quad, np.array([[0, 1, 2], [0, 2, 3]])), color=FLOOR, lighting=False)
+    step = 10.0 ** np.floor(np.log10(size / 4.0))
+    for w in np.arange(np.ceil(v0 / step), v1 / step) * step:
+        plotter.add_mesh(pv.Line(corner(u0, w) + 1e-3 * size * normal, corner(u1, w) + 1e-3 * size * normal), color=SHADOW, line_width=2, lighting=False)
+
+
 def light_directions(view):
     """Towards the lights, in the world: sun, fill, rim. They turn with the camera about the vertical."""
     forward = np.array([view[0], 0.0, view[2]]) / np.hypot(view[0], view[2])
@@ -115,7 +142,7 @@ def light_scene(plotter, directions, centre, size):
         plotter.add_light(light)
 
 
-def draw(scene, window, camera, look_at, angle, centre, size, floor, height):
+def draw(scene, window, camera, look_at, angle, centre, size, floor, height, planes=(), scripted=()):
     """One frame as an array of pixels."""
     plotter = pv.Plotter(off_screen=True, lighting="none", window_size=[2 * side for side in window])
     plotter.set_background(SKY_BOTTOM, top=SKY_TOP)
@@ -125,7 +152,9 @@ def draw(scene, window, camera, look_at, angle, centre, size, floor, height):
     for name, points, faces in scene:
         if len(faces) == 0:
             continue
-        if name.startswith("cloth") or is_open(faces):
+        if name in scripted and is_open(faces):
+            add_glass(plotter, points, faces)
+        elif name.startswith("cloth") or is_open(faces):
             add_cloth(plotter, points, faces)
         else:
             add_solid(plotter, points, faces, SOLIDS[solids % len(SOLIDS)])
@@ -139,6 +168,8 @@ def draw(scene, window, camera, look_at, angle, centre, size, floor, height):
         for _, points, faces in scene:
             if len(faces):
                 add_shadow(plotter, points, faces, ground + 5e-4 * size, directions[0])
+    for plane in planes:
+        add_plane(plotter, plane[:3], plane[3], np.concatenate([points for _, points, _ in scene if len(points)]), size)
     plotter.camera.position, plotter.camera.focal_point = camera, look_at
     plotter.camera.up = (0.0, 1.0, 0.0)
     plotter.camera.view_angle = angle
@@ -153,11 +184,15 @@ def vector(text):
     return np.array([float(word) for word in text.split(",")])
 
 
-def sheet(scenes, out, arguments, height_of_floor):
+def middle_and_extent(points):
+    low, high = points.min(axis=0), points.max(axis=0)
+    return 0.5 * (low + high), float(np.linalg.norm(high - low))
+
+
+def sheet(scenes, out, arguments, height_of_floor, planes=(), scripted=()):
     """Draws frames beside and below each other."""
     points = np.concatenate([points for scene in scenes for _, points, _ in scene if len(points)])
-    low, high = points.min(axis=0), points.max(axis=0)
-    centre, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
+    centre, size = middle_and_extent(points)
     look_at = arguments.look_at if arguments.look_at is not None else centre
     camera = arguments.camera if arguments.camera is not None else centre + size * np.array([0.75, 0.45, 1.05])
 
@@ -166,11 +201,14 @@ def sheet(scenes, out, arguments, height_of_floor):
     rows = -(-len(scenes) // columns)
     picture = np.full((rows * height, columns * width, 3), 255, dtype=np.uint8)
     for index, scene in enumerate(scenes):
-        shift = np.zeros(3)
+        here = (camera, look_at, centre, size)
         if arguments.follow:
-            shift = np.mean([points.mean(axis=0) for _, points, faces in scene if len(faces)], axis=0) - centre
-            shift[1] = 0.0
-        image = draw(scene, (width, height), camera + shift, look_at + shift, 30.0 / arguments.zoom, centre, size, arguments.floor, height_of_floor)
+            # Seen from the same side, as near as what moves freely in this frame allows.
+            free = np.concatenate([points for name, points, faces in scene if len(faces) and name not in scripted])
+            middle, extent = middle_and_extent(free)
+            view = (camera - look_at) / np.linalg.norm(camera - look_at)
+            here = (middle + 1.7 * extent * view, middle, middle, extent)
+        image = draw(scene, (width, height), here[0], here[1], 30.0 / arguments.zoom, here[2], here[3], arguments.floor, height_of_floor, planes, scripted)
         row, column = divmod(index, columns)
         picture[row * height : (row + 1) * height, column * width : (column + 1) * width] = image
     Image.fromarray(picture).save(out, optimize=True)
@@ -183,12 +221,20 @@ def draw_run(run, arguments):
     frames = sorted((run / arguments.folder).glob("frame_*.obj"))
     if not frames:
         raise SystemExit(f"{run / arguments.folder}: no frames")
-    chosen = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, arguments.count).round().astype(int))]
+    chosen = [frames[i] for i in np.unique(np.linspace(0, arguments.to * (len(frames) - 1), arguments.count).round().astype(int))]
     scenes = [read_obj(frame) for frame in chosen]
-    if report["up"] == "z":
-        scenes = [turned(scene) for scene in scenes]
+    up = turned if report["up"] == "z" else np.asarray
+    scenes = [[(name, up(points), faces) for name, points, faces in scene] for scene in scenes]
+    for name in ("camera", "look_at"):
+        if report.get(name) is not None and getattr(arguments, name) is None:
+            setattr(arguments, name, up(report[name]))
+            arguments.zoom = arguments.zoom or 1.0
+    arguments.zoom = arguments.zoom or 0.8
     arguments.floor = report["floor"] is not None
-    sheet(scenes, run / "sheet.png", arguments, report["floor"] or 0.0)
+    planes = [[*up(plane[:3]), plane[3]] for plane in report.get("planes", [])]
+    # The floor is drawn as such.
+    planes = [plane for plane in planes if plane[1] < 0.999]
+    sheet(scenes, run / "sheet.png", arguments, report["floor"] or 0.0, planes, set(report.get("scripted", [])))
     plot(run, report)
 
 
@@ -233,21 +279,20 @@ def main():
     parser.add_argument("out", type=pathlib.Path, help="the picture, or the folder of a run")
     parser.add_argument("frames", nargs="*")
     parser.add_argument("--count", type=int, default=6, help="frames of a run to draw")
+    parser.add_argument("--to", type=float, default=1.0, help="up to this part of the run")
     parser.add_argument("--folder", default="frames", help="frames of a run to draw: frames or subdivided")
     parser.add_argument("--columns", type=int, default=3)
     parser.add_argument("--size", default="640x480", help="of one picture, in pixels")
     parser.add_argument("--camera", type=vector, help="where the camera stands; default: a three-quarter view of all")
     parser.add_argument("--look-at", type=vector)
-    parser.add_argument("--zoom", type=float, help="default: 1, and 0.8 for a run, whose bodies fly and fall")
-    parser.add_argument("--follow", action="store_true", help="move the camera with the middle of what is drawn")
+    parser.add_argument("--zoom", type=float, help="default: 1, and 0.8 for a run whose scene has no camera")
+    parser.add_argument("--follow", action="store_true", help="move the camera with what is not scripted, as near as that allows")
     parser.add_argument("--floor", action="store_true", help="draw a floor at y = 0")
     arguments = parser.parse_args()
-    if arguments.zoom is None:
-        arguments.zoom = 0.8 if arguments.out.is_dir() else 1.0
-
     if arguments.out.is_dir():
         draw_run(arguments.out, arguments)
     elif arguments.frames:
+        arguments.zoom = arguments.zoom or 1.0
         sheet([read_obj(frame) for frame in arguments.frames], arguments.out, arguments, 0.0)
     else:
         parser.error("no frames given, and the first argument is not a folder")

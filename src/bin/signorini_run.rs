@@ -8,7 +8,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 const USAGE: &str = "usage: signorini-run SCENE.toml [options]
-  --method NAME      contact method: implicit, filter
+  --method NAME      contact method in place of the scene's: implicit, filter
+  --fail-safe NAME   unilateral_projection, inelastic_projection, rigid_zone
+  --friction MU      friction coefficient of every body
   --steps N          stop after step N
   --threads N        worker threads (the results do not depend on it)
   --out DIR          write frames, animation.usda, stats.csv, report.json, last.snapshot
@@ -28,13 +30,15 @@ struct Choice {
 
 fn parse() -> Result<Option<Choice>, lexopt::Error> {
     use lexopt::prelude::*;
-    let mut choice = Choice { options: Options { method: "implicit".to_string(), ..Options::default() }, json: false };
+    let mut choice = Choice { options: Options::default(), json: false };
     let mut scene = None;
     let mut parser = lexopt::Parser::from_env();
     while let Some(argument) = parser.next()? {
         let options = &mut choice.options;
         match argument {
-            Long("method") => options.method = parser.value()?.string()?,
+            Long("method") => options.method = Some(parser.value()?.string()?),
+            Long("fail-safe") => options.fail_safe = Some(parser.value()?.string()?),
+            Long("friction") => options.friction = Some(parser.value()?.parse()?),
             Long("steps") => options.steps = Some(parser.value()?.parse()?),
             Long("threads") => options.threads = parser.value()?.parse()?,
             Long("out") => options.out = Some(parser.value()?.into()),

@@ -36,6 +36,11 @@ impl SceneBody {
     pub fn deforms(&self) -> bool {
         matches!(self.energies, Energies::Nodes { .. })
     }
+
+    /// Whether all of it moves as prescribed.
+    pub fn is_scripted(&self) -> bool {
+        matches!(self.energies, Energies::None)
+    }
 }
 
 /// What drives a body from step to step.
@@ -97,6 +102,8 @@ pub struct Scene {
     pub world: World,
     pub bodies: Vec<SceneBody>,
     pub vertices: usize,
+    /// Of bodies that are not scripted.
+    pub free_vertices: usize,
     pub tetrahedra: usize,
 }
 
@@ -106,7 +113,7 @@ impl Scene {
     /// Errors name the field: a mesh that cannot be read or does not fit, what the world refuses.
     pub fn build(file: &SceneFile, folder: &Path, jitter_seed: u64) -> Result<Scene, FieldFault> {
         let mut builder = Builder {
-            scene: Scene { world: World::new(), bodies: Vec::new(), vertices: 0, tetrahedra: 0 },
+            scene: Scene { world: World::new(), bodies: Vec::new(), vertices: 0, free_vertices: 0, tetrahedra: 0 },
             folder,
             materials: Vec::new(),
             jitter_seed,
@@ -403,7 +410,9 @@ impl Builder<'_> {
     }
 
     fn add(&mut self, body: SceneBody) {
-        self.scene.vertices += self.scene.world.positions(body.id).map_or(0, <[Vec3]>::len);
+        let vertices = self.scene.world.positions(body.id).map_or(0, <[Vec3]>::len);
+        self.scene.vertices += vertices;
+        self.scene.free_vertices += if body.is_scripted() { 0 } else { vertices };
         self.scene.bodies.push(body);
     }
 

@@ -83,6 +83,9 @@ pub struct Output {
     /// One animated USD file.
     #[serde(default = "yes")]
     pub usd: bool,
+    /// Where pictures are taken from, and the point in their middle `[m]`; without: a view of all.
+    pub camera: Option<Vec3>,
+    pub look_at: Option<Vec3>,
 }
 
 fn film() -> f64 {
@@ -91,12 +94,12 @@ fn film() -> f64 {
 
 impl Default for Output {
     fn default() -> Self {
-        Output { frames_per_second: film(), obj: true, usd: true }
+        Output { frames_per_second: film(), obj: true, usd: true, camera: None, look_at: None }
     }
 }
 
-/// What a run must keep to. A certified intersection always breaks the run. Bounds marked *end* hold for runs over the
-/// whole duration only.
+/// What a run must keep to. A certified intersection always breaks the run. Bounds marked *end* hold only for runs over
+/// the whole duration of the scene as it is written.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bounds {
@@ -110,6 +113,8 @@ pub struct Bounds {
     pub fail_safes_max: Option<u32>,
     /// Steps that ended pinched.
     pub pinched_max: Option<u32>,
+    /// At least. *End.*
+    pub pinched_min: Option<u32>,
     /// Steps in which a solve stopped at its work cap.
     pub not_converged_max: Option<u32>,
     /// Share of the steps with contact that took three rounds or fewer.
@@ -365,6 +370,15 @@ impl SceneFile {
         Ok(scene)
     }
 
+    /// Gives every body the friction coefficient.
+    pub fn set_friction(&mut self, friction: f64) {
+        self.sheet.iter_mut().for_each(|table| table.friction = friction);
+        self.solid.iter_mut().for_each(|table| table.friction = friction);
+        self.rigid.iter_mut().for_each(|table| table.friction = friction);
+        self.kinematic.iter_mut().for_each(|table| table.friction = friction);
+        self.half_space.iter_mut().for_each(|table| table.friction = friction);
+    }
+
     /// Steps of the whole duration.
     pub fn steps(&self) -> u64 {
         (self.duration / self.dt).round() as u64
@@ -382,6 +396,8 @@ impl SceneFile {
             not_negative(jitter, "", "jitter")?;
         }
         positive(self.output.frames_per_second, "output", "frames_per_second")?;
+        finite(self.output.camera.unwrap_or_default(), "output", "camera")?;
+        finite(self.output.look_at.unwrap_or_default(), "output", "look_at")?;
         self.settings.check()?;
         for (i, table) in self.sheet.iter().enumerate() {
             table.check(&format!("sheet[{i}]"))?;

@@ -15,6 +15,10 @@ pub enum MeshSource {
     Grid { cells: [usize; 2], size: [f64; 2] },
     /// A sheet rolled up about the y axis, open at both ends.
     Tube { cells: [usize; 2], radius: f64, height: f64 },
+    /// Points (distance from the axis, height), turned about the y axis: funnels, cups, vases. Ends on the axis close it.
+    Revolved { profile: Vec<[f64; 2]>, segments: usize },
+    /// Points (x, y), drawn out along z about the origin: troughs, steps, plates bent along lines.
+    Extruded { profile: Vec<[f64; 2]>, length: f64, cells: usize },
     /// A box about the origin; faces are two triangles, or `cells` squares of two triangles along each axis.
     Box { size: Vec3, cells: Option<[usize; 3]> },
     /// A sphere about the origin, no farther from the true one than `tolerance`.
@@ -59,6 +63,24 @@ impl MeshSource {
             MeshSource::Tube { cells, radius, height } => {
                 let counts = vec![("cells", cells[0] / 3), ("cells", cells[1])];
                 ("tube", vec![("radius", *radius), ("height", *height)], counts)
+            }
+            MeshSource::Revolved { profile, segments } => {
+                let last = profile.len().saturating_sub(1);
+                let fits = |(i, [r, y]): (usize, &[f64; 2])| {
+                    r.is_finite() && y.is_finite() && (*r > 0.0 || *r == 0.0 && (i == 0 || i == last))
+                };
+                if let Some(i) = profile.iter().enumerate().position(|(i, point)| !fits((i, point))) {
+                    let field = format!("{at}.revolved.profile[{i}]");
+                    return Err(FieldFault::new(field, "finite and off the axis, which only ends may touch"));
+                }
+                ("revolved", vec![], vec![("profile", last), ("segments", segments / 3)])
+            }
+            MeshSource::Extruded { profile, length, cells } => {
+                if let Some(i) = profile.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+                    return Err(FieldFault::new(format!("{at}.extruded.profile[{i}]"), "not finite"));
+                }
+                let counts = vec![("profile", profile.len().saturating_sub(1)), ("cells", *cells)];
+                ("extruded", vec![("length", *length)], counts)
             }
             MeshSource::Box { size, cells } => {
                 ("box", size.map(|s| ("size", s)).to_vec(), cells.iter().flatten().map(|c| ("cells", *c)).collect())
@@ -115,6 +137,8 @@ impl MeshSource {
         match self {
             MeshSource::Grid { cells, size } => Ok(grid(*cells, *size)),
             MeshSource::Tube { cells, radius, height } => Ok(tube(*cells, *radius, *height)),
+            MeshSource::Revolved { profile, segments } => Ok(revolved(profile, *segments)),
+            MeshSource::Extruded { profile, length, cells } => Ok(extruded(profile, *length, *cells)),
             MeshSource::Box { size, cells: None } => {
                 shape(Shape::Box { half_extents: scale(0.5, *size) }, norm(*size), "box")
             }
@@ -202,6 +226,31 @@ fn tube(cells: [usize; 2], radius: f64, height: f64) -> SourceMesh {
     }
     // Seen from outside, y goes up where the angle goes to the right: first along, then around would wind inward.
     triangles(positions, cell_faces(around, along, |i, j| (i % around * (along + 1) + j) as u32))
+}
+
+/// Around the axis, and along the profile as it is given: seen from outside where its heights rise.
+fn revolved(profile: &[[f64; 2]], segments: usize) -> SourceMesh {
+    let mut positions = Vec::new();
+    let mut first = Vec::new();
+    for [r, y] in profile {
+        first.push(positions.len());
+        for i in 0..if *r > 0.0 { segments } else { 1 } {
+            let (s, c) = (std::f64::consts::TAU * i as f64 / segments as f64).sin_cos();
+            positions.push([r * c, *y, -r * s]);
+        }
+    }
+    let at = |i: usize, j: usize| (first[j] + if profile[j][0] > 0.0 { i % segments } else { 0 }) as u32;
+    let mut faces = cell_faces(segments, profile.len() - 1, at);
+    // Cells at a point on the axis have one face only.
+    faces.retain(|[a, b, c]| a != b && b != c && c != a);
+    triangles(positions, faces)
+}
+
+fn extruded(profile: &[[f64; 2]], length: f64, cells: usize) -> SourceMesh {
+    let along = |k: usize| length * (k as f64 / cells as f64 - 0.5);
+    let row = |[x, y]: &[f64; 2]| (0..=cells).map(|k| [*x, *y, along(k)]).collect::<Vec<Vec3>>();
+    let positions = profile.iter().flat_map(row).collect();
+    triangles(positions, cell_faces(profile.len() - 1, cells, |i, j| (i * (cells + 1) + j) as u32))
 }
 
 fn torus(radius: f64, tube: f64, segments: [usize; 2]) -> SourceMesh {
@@ -419,4 +468,34 @@ fn section<'a>(
     let count: usize = number(Some(count), at)?;
     let found: Vec<(usize, &str)> = lines.by_ref().take(count).collect();
     if found.len() == count { Ok(found) } else { Err((at, format!("{count} lines announced, {} there", found.len()))) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{MassProperties, Surface};
+
+    #[test]
+    fn profiles_turned_and_drawn_out() {
+        // Two cones on a cylinder: closed, seen from outside; the volume of its prism of 24 sides.
+        let profile = vec![[0.0, -1.0], [0.5, -0.5], [0.5, 1.5], [0.0, 2.0]];
+        let source = MeshSource::Revolved { profile, segments: 24 };
+        let mesh = source.mesh(Path::new(""), "").unwrap();
+        assert_eq!((mesh.positions.len(), mesh.triangles.len()), (50, 96));
+        let surface = Surface::from_triangles(mesh.positions, mesh.triangles).unwrap();
+        let volume = MassProperties::of_closed_mesh(&surface, 1.0).unwrap().mass;
+        let base = 24.0 * 0.5 * 0.25 * (std::f64::consts::TAU / 24.0).sin();
+        assert!((volume - base * (2.0 + 2.0 / 6.0)).abs() < 1e-14, "{volume}");
+
+        // A gutter of three strips, 1, 2 and 1 wide.
+        let profile = vec![[-1.0, 1.0], [-1.0, 0.0], [1.0, 0.0], [1.0, 1.0]];
+        let mesh = MeshSource::Extruded { profile, length: 3.0, cells: 5 }.mesh(Path::new(""), "").unwrap();
+        assert_eq!((mesh.positions.len(), mesh.triangles.len()), (24, 30));
+        let area = |[a, b, c]: [u32; 3]| {
+            let at = |v: u32| mesh.positions[v as usize];
+            0.5 * norm(cross(sub(at(b), at(a)), sub(at(c), at(a))))
+        };
+        let total: f64 = mesh.triangles.iter().map(|face| area(*face)).sum();
+        assert!((total - 12.0).abs() < 1e-14, "{total}");
+    }
 }

@@ -1,9 +1,10 @@
 //! The final line of a run, and the bounds that it broke.
 
 use super::energy::Centre;
-use super::file::{Bounds, Up};
+use super::file::{BodyBound, Bounds, Up};
+use super::settings::{FailSafeName, MethodName};
 use super::statistics::{Spread, StepRow};
-use crate::math::{dot, sub, unit};
+use crate::math::{Vec3, dot, sub, unit};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -13,9 +14,14 @@ pub struct Report {
     pub scene: String,
     pub title: String,
     pub about: String,
-    pub method: String,
+    pub method: MethodName,
+    pub fail_safe: FailSafeName,
+    /// Of every body, where it was chosen in place of the scene's.
+    pub friction: Option<f64>,
     pub version: &'static str,
     pub vertices: usize,
+    /// Of bodies that are not scripted.
+    pub free_vertices: usize,
     pub tets: usize,
     pub bodies: usize,
     /// Steps that the state has behind it.
@@ -35,6 +41,8 @@ pub struct Report {
     pub failsafes: u64,
     /// Steps that ended early.
     pub pinched: u64,
+    /// Between which bodies, since the run began or was resumed.
+    pub pinches: Vec<Pinch>,
     /// Steps in which a solve stopped at its work cap.
     pub not_converged: u64,
     /// Certified, over all steps.
@@ -58,6 +66,14 @@ pub struct Report {
     pub up: &'static str,
     /// Offset of the half-space that faces up, if there is one.
     pub floor: Option<f64>,
+    /// Half-spaces at the end: normal and offset.
+    pub planes: Vec<[f64; 4]>,
+    /// Names of the bodies of prescribed motion.
+    pub scripted: Vec<String>,
+    pub camera: Option<Vec3>,
+    pub look_at: Option<Vec3>,
+    /// Where the bodies that bounds name have come.
+    pub ends: Vec<End>,
     pub frames: u64,
     pub frames_per_second: f64,
     /// State hash.
@@ -67,16 +83,40 @@ pub struct Report {
     pub bounds_broken: Vec<String>,
 }
 
+/// Two bodies, by their names in order, with no room between them.
+#[derive(Clone, Debug, Serialize)]
+pub struct Pinch {
+    pub bodies: [String; 2],
+    pub first_step: u64,
+    pub last_step: u64,
+    pub steps: u64,
+}
+
+/// How far the centre of mass of a body has come along a direction, and how fast it goes there.
+#[derive(Clone, Debug, Serialize)]
+pub struct End {
+    pub name: String,
+    pub direction: Vec3,
+    /// `[m]`
+    pub travel: f64,
+    /// `[m/s]`
+    pub speed: f64,
+}
+
 /// What the report needs besides the rows.
 pub struct Facts {
     pub scene: String,
     pub title: String,
     pub about: String,
-    pub method: String,
+    pub method: MethodName,
+    pub fail_safe: FailSafeName,
+    pub friction: Option<f64>,
     pub vertices: usize,
+    pub free_vertices: usize,
     pub tets: usize,
     pub bodies: usize,
     pub steps: u64,
+    /// Whether the bounds about the end count.
     pub whole: bool,
     pub dt: f64,
     /// `[kg]`
@@ -85,6 +125,11 @@ pub struct Facts {
     pub jitter: u64,
     pub up: Up,
     pub floor: Option<f64>,
+    pub planes: Vec<[f64; 4]>,
+    pub scripted: Vec<String>,
+    pub camera: Option<Vec3>,
+    pub look_at: Option<Vec3>,
+    pub pinches: Vec<Pinch>,
     pub frames: u64,
     pub frames_per_second: f64,
     pub hash: u64,
@@ -115,8 +160,11 @@ impl Report {
             title: facts.title,
             about: facts.about,
             method: facts.method,
+            fail_safe: facts.fail_safe,
+            friction: facts.friction,
             version: env!("CARGO_PKG_VERSION"),
             vertices: facts.vertices,
+            free_vertices: facts.free_vertices,
             tets: facts.tets,
             bodies: facts.bodies,
             steps: facts.steps,
@@ -130,6 +178,7 @@ impl Report {
             divisions: count(&|r| r.parts > 1),
             failsafes: count(&StepRow::fail_safe_used),
             pinched: count(&|r| r.certified_fraction < 1.0),
+            pinches: facts.pinches,
             not_converged: count(&|r| r.not_converged > 0),
             intersections: rows.iter().map(|r| u64::from(r.intersections)).sum(),
             residual_max: residuals.iter().copied().fold(0.0, f64::max),
@@ -157,19 +206,32 @@ impl Report {
             jitter: facts.jitter,
             up: if facts.up == Up::Y { "y" } else { "z" },
             floor: facts.floor,
+            planes: facts.planes,
+            scripted: facts.scripted,
+            camera: facts.camera,
+            look_at: facts.look_at,
+            ends: bounds.body.iter().zip(&facts.centres).map(End::of).collect(),
             frames: facts.frames,
             frames_per_second: facts.frames_per_second,
             hash: format!("{:016x}", facts.hash),
             interrupted: facts.interrupted,
             bounds_broken: Vec::new(),
         };
-        report.bounds_broken = broken(&report, bounds, &facts.centres, facts.whole);
+        report.bounds_broken = broken(&report, bounds, facts.whole);
         report
     }
 }
 
+impl End {
+    fn of((bound, [start, end]): (&BodyBound, &[Centre; 2])) -> End {
+        let direction = unit(bound.direction).unwrap_or_default();
+        let travel = dot(direction, sub(end.position, start.position));
+        End { name: bound.name.clone(), direction, travel, speed: dot(direction, end.velocity) }
+    }
+}
+
 /// The bounds that a run broke, each with the number that broke it.
-fn broken(report: &Report, bounds: &Bounds, centres: &[[Centre; 2]], whole: bool) -> Vec<String> {
+fn broken(report: &Report, bounds: &Bounds, whole: bool) -> Vec<String> {
     let mut checks = vec![
         at_most("intersections", report.intersections as f64, Some(0.0)),
         at_most("contacts_max", f64::from(report.contacts_max), bounds.contacts_max.map(f64::from)),
@@ -182,10 +244,9 @@ fn broken(report: &Report, bounds: &Bounds, centres: &[[Centre; 2]], whole: bool
     if whole {
         checks.push(at_least("contacts_min", f64::from(report.contacts_max), bounds.contacts_min.map(f64::from)));
         checks.push(at_most("kinetic_energy_end_max", report.kinetic_energy_end_per_kg, bounds.kinetic_energy_end_max));
-        for (bound, [start, end]) in bounds.body.iter().zip(centres) {
-            let direction = unit(bound.direction).unwrap_or_default();
-            let travel = dot(direction, sub(end.position, start.position));
-            let speed = dot(direction, end.velocity);
+        checks.push(at_least("pinched_min", report.pinched as f64, bounds.pinched_min.map(f64::from)));
+        for (bound, end) in bounds.body.iter().zip(&report.ends) {
+            let (travel, speed) = (end.travel, end.speed);
             let name = |what: &str| format!("{} {what}", bound.name);
             checks.push(at_least(&name("travel_min"), travel, bound.travel_min));
             checks.push(at_most(&name("travel_max"), travel, bound.travel_max));

@@ -3,9 +3,9 @@
 use super::build::Scene;
 use super::energy::Centre;
 use super::fault::{FieldFault, Places, SceneFault};
-use super::file::SceneFile;
+use super::file::{SceneFile, not_negative};
 use super::frames::{surfaces, write_obj, write_whole};
-use super::report::{Facts, Report};
+use super::report::{Facts, Pinch, Report};
 use super::statistics::{StepRow, processor_seconds};
 use super::subdivide::subdivided;
 use super::usd::UsdCache;
@@ -13,6 +13,7 @@ use crate::math::dot;
 use crate::model::{Method, Settings, StepReport};
 use crate::parallel::{Par, Pool};
 use crate::world::{Fault, World};
+use serde::de::{DeserializeOwned, IntoDeserializer};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -21,8 +22,12 @@ use std::path::{Path, PathBuf};
 pub struct Options {
     /// Scene file.
     pub scene: PathBuf,
-    /// Contact method: `implicit` or `filter`.
-    pub method: String,
+    /// Contact method in place of the scene's: `implicit` or `filter`.
+    pub method: Option<String>,
+    /// Fail-safe in place of the scene's: `unilateral_projection`, `inelastic_projection` or `rigid_zone`.
+    pub fail_safe: Option<String>,
+    /// Friction coefficient of every body in place of the scene's.
+    pub friction: Option<f64>,
     /// Step to stop at; `None`: the end of the scene.
     pub steps: Option<u64>,
     /// Threads; 0 and 1 run on the calling one.
@@ -35,6 +40,13 @@ pub struct Options {
     pub jitter: u64,
     /// Levels of subdivision of the finer frames; 0: there are none.
     pub subdivide: u32,
+}
+
+impl Options {
+    /// Whether the scene runs as it is written.
+    fn as_written(&self) -> bool {
+        self.method.is_none() && self.fail_safe.is_none() && self.friction.is_none()
+    }
 }
 
 /// Why there is no report.
@@ -81,10 +93,10 @@ pub struct Finished {
 ///
 /// Errors: the scene, the options, files, a step that was refused. A pinched step is counted and the run goes on.
 pub fn run(options: &Options, watch: &mut dyn FnMut(u64, u64) -> bool) -> Result<Finished, Failure> {
-    let method = method(options)?;
     let name = options.scene.display().to_string();
     let text = std::fs::read_to_string(&options.scene).map_err(|e| Failure::Io(format!("{name}: {e}")))?;
-    let file = SceneFile::parse(&name, &text).map_err(Failure::Scene)?;
+    let mut file = SceneFile::parse(&name, &text).map_err(Failure::Scene)?;
+    choose(options, &mut file)?;
     let places = Places::new(&name, &text);
     let located = |fault: FieldFault| Failure::Scene(places.fault(fault));
     let folder = options.scene.parent().unwrap_or(Path::new(""));
@@ -94,8 +106,7 @@ pub fn run(options: &Options, watch: &mut dyn FnMut(u64, u64) -> bool) -> Result
         threads => Some(Pool::new(threads).map_err(Failure::Usage)?),
     };
     let key = run_key(&text, options);
-    let settings = file.settings.settings(method);
-    let mut run = Run::new(&file, scene, options, settings, key)?;
+    let mut run = Run::new(&file, scene, options, key)?;
     let last = options.steps.unwrap_or(file.steps());
     let par = pool.as_ref().map_or(Par::Serial, Par::Pool);
     run.frame(false, par)?;
@@ -108,19 +119,31 @@ pub fn run(options: &Options, watch: &mut dyn FnMut(u64, u64) -> bool) -> Result
     run.finish(interrupted, last)
 }
 
-/// The contact method by its name.
-fn method(options: &Options) -> Result<Method, Failure> {
-    match options.method.as_str() {
-        "implicit" => Ok(Method::ImplicitContact),
-        "filter" => Ok(Method::VelocityFilter),
-        other => Err(Failure::Usage(format!("there is no method '{other}': implicit, filter"))),
+/// Puts what the options choose in the place of what the scene says.
+fn choose(options: &Options, file: &mut SceneFile) -> Result<(), Failure> {
+    fn named<T: DeserializeOwned>(name: &str, what: &str) -> Result<T, Failure> {
+        T::deserialize(IntoDeserializer::<serde::de::value::Error>::into_deserializer(name))
+            .map_err(|error| Failure::Usage(format!("there is no {what} '{name}': {error}")))
     }
+    if let Some(name) = &options.method {
+        file.settings.method = Some(named(name, "method")?);
+    }
+    if let Some(name) = &options.fail_safe {
+        file.settings.fail_safe = Some(named(name, "fail-safe")?);
+    }
+    if let Some(friction) = options.friction {
+        not_negative(friction, "", "friction")
+            .map_err(|fault| Failure::Usage(format!("friction: {}", fault.message)))?;
+        file.set_friction(friction);
+    }
+    Ok(())
 }
 
-/// What a snapshot must agree with: the scene, its method and its jitter.
+/// What a snapshot must agree with: the scene, what the options chose in its place, and the jitter.
 fn run_key(text: &str, options: &Options) -> u64 {
     // FNV-1a; not for adversaries.
-    let bytes = text.bytes().chain(options.method.bytes()).chain(options.jitter.to_le_bytes());
+    let chosen = format!("{:?}{:?}{:?}", options.method, options.fail_safe, options.friction);
+    let bytes = text.bytes().chain(chosen.bytes()).chain(options.jitter.to_le_bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
@@ -133,28 +156,24 @@ struct Run<'a> {
     step: u64,
     steps_per_frame: u64,
     rows: Vec<StepRow>,
+    pinches: Vec<Pinch>,
     usd: Option<UsdCache>,
     starts: Vec<Centre>,
 }
 
 impl<'a> Run<'a> {
-    fn new(
-        file: &'a SceneFile,
-        scene: Scene,
-        options: &'a Options,
-        settings: Settings,
-        key: u64,
-    ) -> Result<Run<'a>, Failure> {
+    fn new(file: &'a SceneFile, scene: Scene, options: &'a Options, key: u64) -> Result<Run<'a>, Failure> {
         let per_frame = (1.0 / (file.dt * file.output.frames_per_second)).round().max(1.0);
         let mut run = Run {
             file,
-            settings,
+            settings: file.settings.settings(),
             scene,
             options,
             key,
             step: 0,
             steps_per_frame: per_frame as u64,
             rows: Vec::new(),
+            pinches: Vec::new(),
             usd: None,
             starts: Vec::new(),
         };
@@ -214,7 +233,10 @@ impl<'a> Run<'a> {
         let report: StepReport = match outcome {
             Ok(report) => report,
             Err(failure) => match (failure.error.fault, failure.report) {
-                (Fault::Pinched, Some(report)) => *report,
+                (Fault::Pinched, Some(report)) => {
+                    self.count_pinches(number);
+                    *report
+                }
                 _ => {
                     let left = self.save()?;
                     return Err(failed(format!(
@@ -256,7 +278,7 @@ impl<'a> Run<'a> {
         }
         let finer = out.join("subdivided").join(format!("frame_{:06}.obj", self.step));
         if self.options.subdivide > 0 && (due || last) && !finer.exists() {
-            let settings = self.file.settings.settings(Method::ImplicitContact);
+            let settings = Settings { method: Method::ImplicitContact, ..self.settings };
             let surfaces = subdivided(&self.scene, self.options.subdivide, &settings, par)
                 .map_err(|message| Failure::Step(self.step, message))?;
             write_obj(&surfaces, &finer).map_err(io)?;
@@ -267,6 +289,23 @@ impl<'a> Run<'a> {
             usd.add_frame(&self.scene, self.step / self.steps_per_frame).map_err(io)?;
         }
         Ok(())
+    }
+
+    /// Counts the pinched step for each pair of bodies that its witnesses name.
+    fn count_pinches(&mut self, step: u64) {
+        let world = &self.scene.world;
+        let body = |key: u64| self.scene.bodies.iter().find(|body| body.id == world.id_of_key(key));
+        let name = |key: u64| body(key).map_or(String::new(), |body| body.name.clone());
+        let mut pairs: Vec<[String; 2]> = world.witnesses().iter().map(|w| w.bodies.map(name)).collect();
+        pairs.iter_mut().for_each(|pair| pair.sort_unstable());
+        pairs.sort_unstable();
+        pairs.dedup();
+        for bodies in pairs {
+            match self.pinches.iter_mut().find(|pinch| pinch.bodies == bodies) {
+                Some(pinch) => (pinch.last_step, pinch.steps) = (step, pinch.steps + 1),
+                None => self.pinches.push(Pinch { bodies, first_step: step, last_step: step, steps: 1 }),
+            }
+        }
     }
 
     fn centres(&self) -> Result<Vec<Centre>, Failure> {
@@ -309,18 +348,26 @@ impl<'a> Run<'a> {
             scene: self.options.scene.file_stem().unwrap_or_default().to_string_lossy().to_string(),
             title: self.file.title.clone(),
             about: self.file.about.clone(),
-            method: self.options.method.clone(),
+            method: self.file.settings.method.unwrap_or_default(),
+            fail_safe: self.file.settings.fail_safe.unwrap_or_default(),
+            friction: self.options.friction,
             vertices: self.scene.vertices,
+            free_vertices: self.scene.free_vertices,
             tets: self.scene.tetrahedra,
             bodies: self.scene.bodies.len(),
             steps: self.step,
-            whole: self.step >= self.file.steps(),
+            whole: self.step >= self.file.steps() && self.options.as_written(),
             dt: self.file.dt,
             mass: self.scene.bodies.iter().map(|body| body.energies.mass()).sum(),
             threads: self.options.threads.max(1),
             jitter: self.options.jitter,
             up: self.file.up,
             floor: floor(self.file),
+            planes: planes(&self.scene),
+            scripted: self.scene.bodies.iter().filter(|body| body.is_scripted()).map(|b| b.name.clone()).collect(),
+            camera: self.file.output.camera,
+            look_at: self.file.output.look_at,
+            pinches: std::mem::take(&mut self.pinches),
             frames: if self.options.out.is_some() { frames } else { 0 },
             frames_per_second: rate,
             hash: self.scene.world.state_hash(),
@@ -352,14 +399,40 @@ fn floor(file: &SceneFile) -> Option<f64> {
         .next()
 }
 
+/// Half-spaces at the end: normal and offset.
+fn planes(scene: &Scene) -> Vec<[f64; 4]> {
+    let planes = scene.bodies.iter().filter_map(|body| scene.world.half_space(body.id).ok());
+    planes.map(|plane| [plane.normal[0], plane.normal[1], plane.normal[2], plane.offset]).collect()
+}
+
 fn summary(report: &Report) -> String {
     let rounds: Vec<String> = report.cmr_rounds_histogram.iter().map(|(r, n)| format!("{r}: {n}")).collect();
+    let pinches: Vec<String> = report
+        .pinches
+        .iter()
+        .map(|p| {
+            format!(
+                "\npinched between {}: {} steps, {} to {}",
+                p.bodies.join(" and "),
+                p.steps,
+                p.first_step,
+                p.last_step
+            )
+        })
+        .collect();
+    let ends: Vec<String> = report
+        .ends
+        .iter()
+        .map(|end| {
+            format!("\n{} has gone {:.4} m along {:?}, at {:.4} m/s", end.name, end.travel, end.direction, end.speed)
+        })
+        .collect();
     let (t, p) = (&report.seconds_per_step, &report.processor_seconds_per_step);
     format!(
         "{}: {} vertices, {} tetrahedra, {} bodies, {} steps of {} s\n\
          contacts at most {}; rounds {{{}}}; {} steps divided, {} with fail-safes, {} pinched, {} not converged\n\
          {} intersections (certified, all steps); largest residual {:.2e}\n\
-         seconds a step: mean {:.4}, median {:.4}, p95 {:.4}, max {:.4}; of the processor: median {:.4}, p95 {:.4}\n\
+         seconds a step: mean {:.4}, median {:.4}, p95 {:.4}, max {:.4}; of the processor: median {:.4}, p95 {:.4}{}{}\n\
          hash {}",
         report.scene,
         report.vertices,
@@ -381,6 +454,8 @@ fn summary(report: &Report) -> String {
         t.max,
         p.median,
         p.p95,
+        pinches.concat(),
+        ends.concat(),
         report.hash,
     )
 }

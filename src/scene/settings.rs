@@ -3,12 +3,13 @@
 use super::fault::FieldFault;
 use super::file::{not_negative, positive};
 use crate::model::{FailSafe, FilterSettings, FrictionCone, Method, Settings, SolverChoice, StartPolicy, ZoneFriction};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Settings of the step; what is not given keeps its default.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SettingsTable {
+    pub method: Option<MethodName>,
     pub solver: Option<Solver>,
     pub friction_cone: Option<Cone>,
     pub start: Option<Start>,
@@ -28,9 +29,18 @@ pub struct SettingsTable {
     pub passes_max: Option<u32>,
 }
 
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MethodName {
+    #[default]
+    Implicit,
+    Filter,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FailSafeName {
+    #[default]
     UnilateralProjection,
     InelasticProjection,
     RigidZone,
@@ -70,9 +80,13 @@ pub enum Start {
 }
 
 impl SettingsTable {
-    /// The settings of a method, with every step certified.
-    pub fn settings(&self, method: Method) -> Settings {
+    /// The settings, with every step certified.
+    pub fn settings(&self) -> Settings {
         let d = Settings::default();
+        let method = match self.method.unwrap_or_default() {
+            MethodName::Implicit => Method::ImplicitContact,
+            MethodName::Filter => Method::VelocityFilter,
+        };
         let solver = self.solver.map_or(d.solver, |solver| match solver {
             Solver::Automatic => SolverChoice::Automatic,
             Solver::IterativeAnticipation => SolverChoice::IterativeAnticipation,
@@ -89,11 +103,11 @@ impl SettingsTable {
             Start::Refuse => StartPolicy::Refuse,
             Start::Pass => StartPolicy::Pass,
         });
-        let fail_safe = self.fail_safe.map_or(d.fail_safe, |name| match name {
+        let fail_safe = match self.fail_safe.unwrap_or_default() {
             FailSafeName::UnilateralProjection => FailSafe::UnilateralProjection,
             FailSafeName::InelasticProjection => FailSafe::InelasticProjection,
             FailSafeName::RigidZone => FailSafe::RigidZone,
-        });
+        };
         let zone_friction = self.zone_friction.map_or(d.zone_friction, |name| match name {
             ZoneFrictionName::PerContact => ZoneFriction::PerContact,
             ZoneFrictionName::PerZone => ZoneFriction::PerZone,

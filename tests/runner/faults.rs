@@ -88,6 +88,27 @@ fn faults_of_scene_files_are_named() {
             "sheet[0].pins[0].follow",
             "no kinematic body is named 'nobody'",
         ),
+        (
+            "mesh.sphere = { radius = 0.08, tolerance = 0.004 }",
+            "mesh.revolved = { profile = [[0.0, 0.0], [0.1, 0.1], [0.0, 0.2], [0.1, 0.3]], segments = 8 }",
+            "mesh.revolved",
+            "rigid[0].mesh.revolved.profile[2]",
+            "off the axis",
+        ),
+        (
+            "mesh.sphere = { radius = 0.08, tolerance = 0.004 }",
+            "mesh.extruded = { profile = [[0.0, 0.0]], length = 1.0, cells = 2 }",
+            "mesh.extruded",
+            "rigid[0].mesh.extruded.profile",
+            "too few",
+        ),
+        (
+            "duration = 0.4",
+            "duration = 0.4\nsettings.method = \"exact\"",
+            "exact",
+            "settings.method",
+            "unknown variant",
+        ),
         ("dt = 0.01", "dt = = 1", "dt = = 1", "", ""),
     ];
     folder.file("bad.obj", "v 0 0 0\nv 1 x 0\n");
@@ -114,6 +135,8 @@ fn faults_of_the_command_line_are_named() {
     folder.file("bad.snapshot", "SGNRUN");
     for (arguments, message) in [
         (&["scene.toml", "--method", "explicit"][..], "'explicit'"),
+        (&["scene.toml", "--fail-safe", "hope"], "there is no fail-safe 'hope'"),
+        (&["scene.toml", "--friction", "-1"], "friction: finite and not negative"),
         (&["scene.toml", "--steps", "many"], "many"),
         (&["scene.toml", "--colour"], "--colour"),
         (&["scene.toml", "other.toml"], "other.toml"),

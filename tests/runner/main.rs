@@ -5,6 +5,7 @@
 mod command;
 
 mod faults;
+mod filter_scenes;
 mod masonry;
 mod outputs;
 mod resume;

@@ -13,9 +13,7 @@ fn check(name: &str, short: u32, all: [u32; 2]) {
     let [starts, steps] = if slow { all } else { [2, short] };
     for seed in 0..starts {
         let (seed, steps) = (seed.to_string(), steps.to_string());
-        // The scenes of the velocity filter.
-        let method = if name.starts_with("squares") { "filter" } else { "implicit" };
-        let line = report(&folder, &[scene.as_str(), "--method", method, "--jitter", &seed, "--steps", &steps]);
+        let line = report(&folder, &[scene.as_str(), "--jitter", &seed, "--steps", &steps]);
         assert_eq!(line["intersections"].as_u64(), Some(0), "{name} {seed}");
         assert!(line["contacts_max"].as_u64() > Some(0), "{name} {seed}: nothing touches");
         println!("{name} {seed}: {line}");
@@ -65,6 +63,7 @@ scenes! {
     letters 12, all: 1 x 100;
     needle 30, all: 4 x 500;
     pile 30, all: 3 x 200;
+    ribbon 150, all: 3 x 1000;
     ring_shot 12, all: 4 x 100;
     rolling_sphere 60, all: 10 x 500;
     soft_pile 6, all: 2 x 100;

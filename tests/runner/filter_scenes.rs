@@ -1,0 +1,33 @@
+//! What scenes of the velocity filter come to with other friction and other fail-safes than they are written with.
+
+use crate::command::{Folder, report};
+use std::path::Path;
+
+fn all() -> bool {
+    std::env::var("SIGNORINI_ALL").is_ok_and(|v| v == "1")
+}
+
+/// Runs a scene of `examples/scenes` with options; it must be clean, and its bounds kept.
+fn run(folder: &Folder, name: &str, options: &[&str]) -> serde_json::Value {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes").join(name).with_extension("toml");
+    let line = report(folder, &[&[scene.display().to_string().as_str()], options].concat());
+    assert_eq!(line["intersections"].as_u64(), Some(0), "{name} {options:?}");
+    println!("{name} {options:?}: {} {}", line["ends"], line["seconds_per_step"]);
+    line
+}
+
+/// How far the first body that a bound names has come.
+fn travel(line: &serde_json::Value) -> f64 {
+    line["ends"][0]["travel"].as_f64().expect("a number")
+}
+
+/// [Harmon10, Fig. 3.8]: the more friction, the less far the ribbon comes.
+#[test]
+fn friction_slows_the_ribbon_and_holds_it() {
+    let folder = Folder::new("ribbon-friction");
+    let (steps, coefficients) =
+        if all() { ("1000", &["0", "0.1", "0.3", "0.6"][..]) } else { ("240", &["0", "0.6"][..]) };
+    let way = |friction: &&str| travel(&run(&folder, "ribbon", &["--friction", friction, "--steps", steps]));
+    let ways: Vec<f64> = coefficients.iter().map(way).collect();
+    assert!(ways.is_sorted_by(|a, b| *a > 1.1 * b), "{ways:?}");
+}
