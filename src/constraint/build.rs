@@ -43,6 +43,8 @@ pub fn build_rows(
     about: &Linearisation,
 ) -> BuiltRows {
     let mut built = BuiltRows::default();
+    built.rows.reserve(contacts.len());
+    built.contact.reserve(contacts.len());
     built.rows.offsets.push(0);
     built.rows.angular_offsets.push(0);
     let response: Vec<Vec3> = about.velocities.iter().zip(about.unconstrained).map(|(v, u)| sub(*v, *u)).collect();

@@ -38,6 +38,18 @@ pub struct RowSet {
 }
 
 impl RowSet {
+    /// Makes room for this many contacts of four vertices each.
+    pub(super) fn reserve(&mut self, contacts: usize) {
+        self.offsets.reserve(contacts + 1);
+        self.blocks.reserve(4 * contacts);
+        self.weights.reserve(4 * contacts);
+        self.angular_offsets.reserve(contacts + 1);
+        self.frames.reserve(contacts);
+        self.normal_targets.reserve(contacts);
+        self.sliding_velocities.reserve(contacts);
+        self.friction.reserve(contacts);
+    }
+
     /// Number of contacts.
     pub fn len(&self) -> usize {
         self.frames.len()

@@ -46,6 +46,12 @@ impl ConstraintSet {
     /// The set of the contacts near the start, warm-started by key; those beyond their thickness are watched.
     pub fn new(model: &Model, contacts: Vec<Contact>, memory: &Memory, settings: &Settings, dt: f64) -> ConstraintSet {
         let mut set = ConstraintSet::default();
+        let resting = contacts.iter().filter(|c| c.start_gap < RESTING_SHARE * c.thickness).count();
+        set.required_gaps.reserve(resting);
+        set.kept_tangents.reserve(resting);
+        set.solved.reserve(resting);
+        set.contacts.reserve(resting);
+        set.watched.reserve(contacts.len() - resting);
         for contact in contacts {
             if contact.start_gap < RESTING_SHARE * contact.thickness {
                 set.push(model, contact, memory, settings, dt);

@@ -115,11 +115,10 @@ impl<'a, 'b> DoubleRelaxation<'a, 'b> {
         let Task { problem, par, .. } = *self.task;
         let matrix = problem.matrix;
         let (u, nodes, momentum) = (&self.u, &self.nodes, &self.momentum);
-        let mut tasks: Vec<(usize, &mut [Vec3], Sums)> =
-            self.a_u.chunks_mut(BLOCK).enumerate().map(|(i, c)| (i * BLOCK, c, Sums::default())).collect();
-        par.for_each_task(&mut tasks, |(start, out, sums)| {
+        let block = |(block, out): (usize, &mut [Vec3])| {
+            let mut sums = Sums::default();
             for (i, y) in out.iter_mut().enumerate() {
-                let b = *start + i;
+                let b = block * BLOCK + i;
                 let node = &nodes[b];
                 *y = matrix.row_product(b, u);
                 let e = sub(u[b], node.z);
@@ -128,9 +127,12 @@ impl<'a, 'b> DoubleRelaxation<'a, 'b> {
                 sums.metric += dot(e, se);
                 sums.turn -= dot(se, sub(u[b], node.dv));
             }
-        });
+            sums
+        };
+        let mut total = Sums::default();
+        par.fold_tasks(self.a_u.chunks_mut(BLOCK).enumerate(), block, |sums| total = total.plus(&sums));
         self.work.blocks += matrix.values.len() as u64;
-        tasks.iter().fold(Sums::default(), |t, (_, _, s)| t.plus(s))
+        total
     }
 
     /// Puts the iterate into `now`, `A dv'` and `C^T p` into the buffers; returns the residuals.
@@ -150,11 +152,9 @@ impl<'a, 'b> DoubleRelaxation<'a, 'b> {
         let (beta, change) = self.momentum.next();
         let (a_u, inverse, coupled) = (&self.a_u, &self.inverse, self.momentum.coupled);
         let chunks = self.nodes.chunks_mut(BLOCK).zip(self.u.chunks_mut(BLOCK));
-        let mut tasks: Vec<(usize, &mut [Node], &mut [Vec3])> =
-            chunks.enumerate().map(|(i, (nodes, u))| (i * BLOCK, nodes, u)).collect();
-        self.task.par.for_each_task(&mut tasks, |(start, nodes, u)| {
+        let block = |(block, (nodes, u)): (usize, (&mut [Node], &mut [Vec3]))| {
             for (i, (node, u)) in nodes.iter_mut().zip(u.iter_mut()).enumerate() {
-                let b = *start + i;
+                let b = block * BLOCK + i;
                 let z = add_scaled(*u, beta, sub(*u, node.dv));
                 let a_z = add_scaled(a_u[b], beta, sub(a_u[b], node.a_dv));
                 let response = match contact {
@@ -167,7 +167,8 @@ impl<'a, 'b> DoubleRelaxation<'a, 'b> {
                 *node = Node { dv: *u, a_dv: a_u[b], z, a_z };
                 *u = add(z, response);
             }
-        });
+        };
+        self.task.par.fold_tasks(chunks.enumerate(), block, |()| {});
     }
 
     /// Contacts that most passes relax.

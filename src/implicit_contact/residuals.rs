@@ -109,21 +109,20 @@ pub(super) fn near_residuals(task: &Task, list: impl Iterator<Item = usize>, dv:
 /// Natural-map residuals alone (the dynamics residual is left 0).
 pub(super) fn contact_residuals(task: &Task, dv: &[Vec3], p: &[Vec3]) -> Residuals {
     let count = task.packed.contacts.len();
-    let mut partial = vec![Residuals::default(); count.div_ceil(BLOCK)];
-    // One entry per block of contacts: maxima do not care about order, the sum is taken in index order.
-    let each = |r: &mut Residuals, b: usize| {
+    // Block by block of contacts: maxima do not care about order, the sum is taken in index order.
+    let each = |b: usize| {
+        let mut r = Residuals::default();
         for c in b * BLOCK..count.min((b + 1) * BLOCK) {
-            count_contact(task, r, c, dv, p[c]);
+            count_contact(task, &mut r, c, dv, p[c]);
         }
+        r
     };
-    let mut tasks: Vec<(usize, &mut Residuals)> = partial.iter_mut().enumerate().collect();
-    task.par.for_each_task(&mut tasks, |(b, r)| each(r, *b));
     let mut total = Residuals::default();
-    for r in partial {
+    task.par.fold_tasks(0..count.div_ceil(BLOCK), each, |r| {
         total.normal = total.normal.max(r.normal);
         total.friction = total.friction.max(r.friction);
         total.contact_energy += r.contact_energy;
-    }
+    });
     total.normal /= task.velocity_scale;
     total.friction /= task.velocity_scale;
     total

@@ -147,6 +147,9 @@ impl<'a> SinglePass<'a> {
     pub fn start(&mut self, p: &[Vec3], base: &[Vec3]) {
         self.bases += 1;
         self.near.clear();
+        let pressing = p.iter().filter(|p| p[0] > 0.0).count();
+        self.near.reserve(pressing);
+        self.records.reserve(pressing);
         for (c, p) in p.iter().enumerate() {
             if p[0] > 0.0 {
                 let r = self.record(c, base);

@@ -37,6 +37,8 @@ pub(super) struct SingleRelaxation<'a, 'b> {
     u: Vec<Quad>,
     /// `A dv'`
     a_u: Vec<Quad>,
+    /// Velocities that contacts are screened by.
+    velocities: Vec<Quad>,
     momentum: Momentum<'b>,
     iteration: u32,
     work: Work,
@@ -56,6 +58,7 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
             nodes: vec![Node::default(); blocks],
             u: vec![Quad::default(); blocks],
             a_u: vec![Quad::default(); blocks],
+            velocities: Vec::new(),
             momentum: Momentum::new(coupled, metric_scale),
             iteration: 0,
             work: Work::default(),
@@ -112,21 +115,23 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
 
     fn screen(&mut self) {
         let (base, u) = (&self.base_rounded, &self.u);
-        let v = self.task.par.map_indexed(u.len(), |b| base[b] + u[b]);
-        self.work.contacts += self.contacts.screen(&v, &self.base);
+        self.velocities.resize(u.len(), Quad::default());
+        self.task.par.map_into(&mut self.velocities, |b| base[b] + u[b]);
+        self.work.contacts += self.contacts.screen(&self.velocities, &self.base);
     }
 
     /// `A dv'` and the sums that steer step and momentum.
     fn product(&mut self) -> Sums {
         let matrix = self.task.single;
         let (u, nodes, block_scale) = (&self.u[..], &self.nodes[..], &self.block_scale[..]);
-        let mut tasks: Vec<(usize, &mut [Quad], Sums)> =
-            self.a_u.chunks_mut(BLOCK).enumerate().map(|(i, c)| (i * BLOCK, c, Sums::default())).collect();
-        self.task.par.for_each_task(&mut tasks, |(start, out, sums)| {
-            *sums = run_wide(Product { matrix, u, nodes, block_scale, start: *start, out });
-        });
+        let mut total = Sums::default();
+        self.task.par.fold_tasks(
+            self.a_u.chunks_mut(BLOCK).enumerate(),
+            |(i, out)| run_wide(Product { matrix, u, nodes, block_scale, start: i * BLOCK, out }),
+            |sums| total = total.plus(&sums),
+        );
         self.work.blocks += self.task.problem.matrix.values.len() as u64;
-        tasks.iter().fold(Sums::default(), |t, (_, _, s)| t.plus(s))
+        total
     }
 
     /// Puts the iterate into `now`, `A dv'` and `C^T p` into the buffers; returns the residuals. Contacts that are not
@@ -180,12 +185,11 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
         let (a_u, inverse) = (&self.a_u[..], self.contacts.inverse());
         let coupled = self.momentum.coupled;
         let chunks = self.nodes.chunks_mut(BLOCK).zip(self.u.chunks_mut(BLOCK));
-        let mut tasks: Vec<(usize, &mut [Node], &mut [Quad])> =
-            chunks.enumerate().map(|(i, (nodes, u))| (i * BLOCK, nodes, u)).collect();
-        self.task.par.for_each_task(&mut tasks, |(start, nodes, u)| {
-            let (beta, change) = (beta as f32, change as f32);
-            run_wide(Extrapolate { nodes, u, a_u, inverse, gradient, coupled, beta, change, start: *start });
-        });
+        let (beta, change) = (beta as f32, change as f32);
+        let block = |(i, (nodes, u)): (usize, (&mut [Node], &mut [Quad]))| {
+            run_wide(Extrapolate { nodes, u, a_u, inverse, gradient, coupled, beta, change, start: i * BLOCK });
+        };
+        self.task.par.fold_tasks(chunks.enumerate(), block, |()| {});
     }
 
     /// Work so far.

@@ -112,25 +112,26 @@ impl ErrorSystem<'_> {
             run_wide(Turn { d, z: &preconditioned[start..], beta: beta as f32 });
         });
         let (matrix, d) = (self.matrix, &self.direction[..]);
-        let mut tasks: Vec<(usize, &mut [Quad], f64)> =
-            self.image.chunks_mut(BLOCK).enumerate().map(|(i, c)| (i * BLOCK, c, 0.0)).collect();
-        self.par
-            .for_each_task(&mut tasks, |(start, out, sum)| *sum = run_wide(Image { matrix, d, start: *start, out }));
-        tasks.iter().map(|t| t.2).sum()
+        let mut total = 0.0;
+        self.par.fold_tasks(
+            self.image.chunks_mut(BLOCK).enumerate(),
+            |(i, out)| run_wide(Image { matrix, d, start: i * BLOCK, out }),
+            |sum| total += sum,
+        );
+        total
     }
 
     /// Takes `alpha` images off the residual; returns its square in the norm of the inverse diagonal.
     fn descend(&mut self, alpha: f64) -> f64 {
         let (inverse, image) = (&self.inverse[..], &self.image[..]);
         let parts = self.residual.chunks_mut(BLOCK).zip(self.preconditioned.chunks_mut(BLOCK)).enumerate();
-        let mut tasks: Vec<(Descend, f64)> = parts
-            .map(|(i, (r, z))| {
-                let s = i * BLOCK;
-                (Descend { r, z, inverse: &inverse[s..], image: &image[s..], alpha: alpha as f32 }, 0.0)
-            })
-            .collect();
-        self.par.for_each_task(&mut tasks, |(kernel, sum)| *sum = run_wide(kernel));
-        tasks.iter().map(|t| t.1).sum()
+        let block = |(i, (r, z)): (usize, (&mut [Quad], &mut [Quad]))| {
+            let s = i * BLOCK;
+            run_wide(&mut Descend { r, z, inverse: &inverse[s..], image: &image[s..], alpha: alpha as f32 })
+        };
+        let mut total = 0.0;
+        self.par.fold_tasks(parts, block, |sum| total += sum);
+        total
     }
 }
 

@@ -149,6 +149,24 @@ impl Par<'_> {
         }
     }
 
+    /// Calls `f` for every task of a list that is made on the way, and `take` for what it gives, in the order of the list.
+    /// Without a pool nothing is gathered.
+    pub fn fold_tasks<T: Send, R: Send>(
+        &self,
+        mut tasks: impl ExactSizeIterator<Item = T>,
+        f: impl Fn(T) -> R + Sync,
+        mut take: impl FnMut(R),
+    ) {
+        match self.pool() {
+            Some(pool) if tasks.len() > 1 => {
+                let tasks: Vec<T> = tasks.collect();
+                let results: Vec<R> = pool.install(|| tasks.into_par_iter().with_max_len(1).map(&f).collect());
+                results.into_iter().for_each(take);
+            }
+            _ => tasks.for_each(|task| take(f(task))),
+        }
+    }
+
     /// `sum f(i)` for `i` in `0..count`, summed within blocks of [`BLOCK`] and then over blocks in index order.
     pub fn sum(&self, count: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
         let blocks = count.div_ceil(BLOCK);
@@ -176,6 +194,20 @@ mod tests {
             assert_eq!(serial.to_bits(), Par::Pool(&pool).sum(100_003, f).to_bits());
             let squares = Par::Pool(&pool).map_indexed(5000, |i| i * i);
             assert!(squares.iter().enumerate().all(|(i, s)| *s == i * i));
+        }
+    }
+    #[test]
+    fn folds_keep_the_order_of_their_tasks_on_any_number_of_threads() {
+        let order = |par: Par| {
+            let mut seen = Vec::new();
+            par.fold_tasks((0..300).map(|i| 3 * i), |i| i + 1, |r| seen.push(r));
+            seen
+        };
+        let wanted: Vec<usize> = (0..300).map(|i| 3 * i + 1).collect();
+        assert_eq!(order(Par::Serial), wanted);
+        for threads in [1, 2, 5] {
+            let pool = Pool::new(threads).expect("threads start");
+            assert_eq!(order(Par::Pool(&pool)), wanted);
         }
     }
 }
