@@ -1042,8 +1042,9 @@ typedef struct SgnMaterialDesc {
    */
   double friction;
   /**
-   * Coefficient of restitution, 0 to 1. Read by no method: the velocity filter takes that of `SgnStepDesc`, the implicit
-   * method's impacts are inelastic. Default: 0.
+   * Coefficient of restitution, 0 to 1: the share of its normal velocity with which a collision parts. A pair has the
+   * greatest of its two materials' and of that of `SgnStepDesc`. Read by the velocity filter; the implicit method's
+   * impacts are inelastic. Default: 0.
    */
   double restitution;
 } SgnMaterialDesc;
@@ -1794,7 +1795,8 @@ typedef struct SgnStepDesc {
    */
   SgnZoneFriction zone_friction;
   /**
-   * Velocity filter: coefficient of restitution of collisions, 0 to 1. Default: 0.
+   * Velocity filter: coefficient of restitution that collisions have at least, whatever their materials', 0 to 1.
+   * Default: 0.
    */
   double restitution;
   /**

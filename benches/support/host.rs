@@ -156,7 +156,8 @@ impl Plan {
             columns: pattern.columns,
             upper: false,
         };
-        let material = Material { friction_coefficient: self.friction, combine_rule: CombineRule::default() };
+        let material =
+            Material { friction_coefficient: self.friction, combine_rule: CombineRule::default(), restitution: 0.0 };
         let materials = Materials { list: vec![material], overrides: Vec::new() };
         let model = Model::build(bodies, materials, vec![system]).expect("a valid model");
         let mut state = model.rest_state();

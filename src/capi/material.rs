@@ -30,8 +30,9 @@ pub struct SgnMaterialDesc {
     pub combine: SgnCombine,
     /// Coulomb friction coefficient, at least 0. Default: 0.
     pub friction: f64,
-    /// Coefficient of restitution, 0 to 1. Read by no method: the velocity filter takes that of `SgnStepDesc`, the implicit
-    /// method's impacts are inelastic. Default: 0.
+    /// Coefficient of restitution, 0 to 1: the share of its normal velocity with which a collision parts. A pair has the
+    /// greatest of its two materials' and of that of `SgnStepDesc`. Read by the velocity filter; the implicit method's
+    /// impacts are inelastic. Default: 0.
     pub restitution: f64,
 }
 
@@ -57,15 +58,7 @@ impl SgnMaterialDesc {
                 return Err(Failure::new(SGN_ERROR_INVALID_ARGUMENT, message).value(f64::from(other)));
             }
         };
-        if !self.restitution.is_finite() {
-            let message = "the coefficient of restitution is not finite";
-            return Err(Failure::new(super::SGN_ERROR_NON_FINITE_INPUT, message).value(self.restitution));
-        }
-        if !(0.0..=1.0).contains(&self.restitution) {
-            let message = format!("the coefficient of restitution {} is not in 0 to 1", self.restitution);
-            return Err(Failure::new(SGN_ERROR_INVALID_ARGUMENT, message).value(self.restitution));
-        }
-        Ok(Material { friction_coefficient: self.friction, combine_rule })
+        Ok(Material { friction_coefficient: self.friction, combine_rule, restitution: self.restitution })
     }
 }
 

@@ -133,7 +133,8 @@ pub struct SgnStepDesc {
     pub fail_safe: SgnFailSafe,
     /// An `SGN_ZONE_FRICTION_` constant.
     pub zone_friction: SgnZoneFriction,
-    /// Velocity filter: coefficient of restitution of collisions, 0 to 1. Default: 0.
+    /// Velocity filter: coefficient of restitution that collisions have at least, whatever their materials', 0 to 1.
+    /// Default: 0.
     pub restitution: f64,
     /// Velocity filter: stiffness of the springs between what is closer than its thickness, in units of effective mass over
     /// `dt^2`, 0 to 1e6; 1 makes up for the whole overlap in a step, but for the cap of `recovery_fraction`. 0: no springs.

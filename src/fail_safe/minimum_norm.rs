@@ -1,14 +1,18 @@
 //! The smallest vector that meets equations which may repeat or contradict each other.
 
+use super::zone_factor::ZoneFactor;
 use super::zone_rows::{ZoneRows, inner};
 use crate::math::{Vec3, add_scaled, scale};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Rank cut: directions whose singular value is below this share of the largest one are left out. Rows are unit vectors.
-pub(super) const RANK_CUT: f64 = 1e-6;
+const RANK_CUT: f64 = 1e-6;
 
 /// Rows up to which matrices are dense and the spectrum is computed.
-pub(super) const DENSE_ROWS: usize = 128;
+const DENSE_ROWS: usize = 128;
+
+/// The penalty, relative to unit rows, of the factor in the unknowns: directions below 1e-5 of the largest fade out.
+const PENALTY: f64 = 1e10;
 
 /// Rows up to which `A A^T` is factored; more are solved by bidiagonalisation.
 const FACTORED_ROWS: usize = 800;
@@ -38,13 +42,18 @@ pub(super) struct MinimumNorm {
 
 /// The least-squares solution of `A y = r` of smallest norm, at the rank cut.
 ///
-/// Few rows: by the eigenvectors of `A A^T`, refined once. More: by a factor of `A A^T` with the square of the cut on its
-/// diagonal, refined: directions below the cut fade out. Many, or such as contradict each other: by the bidiagonalisation of Golub and Kahan in the form
+/// Few rows: by the eigenvectors of `A A^T`, refined once. More: by the factor in the unknowns where there is one, else by a
+/// factor of `A A^T` with the square of the cut on its diagonal, refined: directions below the cut fade out. Many, or such as contradict each other: by the bidiagonalisation of Golub and Kahan in the form
 /// of Paige and Saunders, at most three times four steps a row; there the cut is what that many steps do not reach. Cost:
 /// cubic in few rows, else linear in entries times steps.
-pub(super) fn minimum_norm(rows: &ZoneRows, right: &[f64]) -> MinimumNorm {
+pub(super) fn minimum_norm(rows: &ZoneRows, right: &[f64], factor: &mut Option<ZoneFactor>) -> MinimumNorm {
     if rows.len() <= DENSE_ROWS
         && let Some(solution) = by_spectrum(rows, right)
+    {
+        return solution;
+    }
+    if let Some(factor) = factor
+        && let Some(solution) = by_unknowns(rows, right, factor)
     {
         return solution;
     }
@@ -85,6 +94,29 @@ fn by_spectrum(rows: &ZoneRows, right: &[f64]) -> Option<MinimumNorm> {
     lambda += solve(&left);
     let y = rows.transposed_product(lambda.as_slice());
     Some(MinimumNorm { y, multipliers: lambda.as_slice().to_vec(), rank: kept.len() })
+}
+
+/// Iterated Tikhonov regularisation in the unknowns; `None` where the equations contradict each other.
+fn by_unknowns(rows: &ZoneRows, right: &[f64], factor: &mut ZoneFactor) -> Option<MinimumNorm> {
+    let all: Vec<usize> = (0..rows.len()).collect();
+    if !factor.assign(rows, &all, PENALTY) {
+        return None;
+    }
+    let largest = right.iter().fold(0.0_f64, |m, r| m.max(r.abs()));
+    let mut multipliers = vec![0.0; rows.len()];
+    let mut y = vec![[0.0; 3]; rows.width];
+    for _ in 0..REFINEMENTS {
+        // Multipliers grow by `(A A^T + 1/penalty)^-1` of what is left, which is what the unknowns leave of it.
+        let left: Vec<f64> = (0..rows.len()).map(|i| PENALTY * (right[i] - rows.product(i, &y))).collect();
+        let mut change = rows.transposed_product(&left);
+        factor.solve(&mut change);
+        for (i, multiplier) in multipliers.iter_mut().enumerate() {
+            *multiplier += left[i] - PENALTY * rows.product(i, &change);
+        }
+        y = rows.transposed_product(&multipliers);
+    }
+    let bounded = multipliers.iter().all(|l| l.abs() <= LARGEST_MULTIPLIER * largest);
+    bounded.then_some(MinimumNorm { y, rank: rows.len(), multipliers })
 }
 
 /// Iterated Tikhonov regularisation; `None` where the equations contradict each other.

@@ -8,12 +8,14 @@
 //! * `zones`: collisions that share degrees of freedom, grown and answered together
 //! * `zone_projection`: the velocities of a zone projected, with friction
 //! * `zone_rows`: gradients of a zone's collisions
+//! * `active_set`: the unilateral projection of few unknowns
 //! * `zone_factor`: a direct solver in a zone's unknowns
 //! * `minimum_norm`: the inelastic projection, equations that may repeat and contradict each other
 //! * `unilateral_projection`: the projection whose impulses only push
 //! * `zone_friction`: friction per contact and per zone
 //! * `rigid_zone`, `hold`, `pinch`: what comes after projections
 
+mod active_set;
 mod hold;
 mod minimum_norm;
 mod nodes;

@@ -1,6 +1,8 @@
 //! Continuous detection as a fail-safe sees it: velocities in, hits out.
 
-use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing, renewed_hits, swept_hits};
+use crate::contact_search::{
+    BodyFilter, CandidateSearch, Contact, Hit, Passing, near_contacts, renewed_hits, swept_hits,
+};
 use crate::math::Vec3;
 use crate::model::{Segment, State};
 use crate::parallel::Par;
@@ -29,6 +31,13 @@ impl Sweep<'_> {
         let found = candidates.update(model, self.filter, &start.positions, &end.positions, self.factor, par);
         let hits = swept_hits(model, self.filter, self.passing, found, start, &end, par);
         (end, hits)
+    }
+
+    /// Contacts that are closer than their thickness at the start, as [`near_contacts`].
+    pub fn near(&self, end: &State, candidates: &mut CandidateSearch) -> Vec<Contact> {
+        let (start, model, par) = (self.segment.start, self.segment.model, self.par);
+        let found = candidates.update(model, self.filter, &start.positions, &end.positions, self.factor, par);
+        near_contacts(model, self.filter, self.passing, found, start, end, 1.0, par)
     }
 
     /// [`Sweep::test`] of the whole segment where the hits of another end are known: what ends where it ended is not tested

@@ -1,5 +1,6 @@
 //! The smallest change of velocities after which no row falls short: impulses push and never pull [Harmon10, §3.5].
 
+use super::active_set::active_set;
 use super::zone_factor::ZoneFactor;
 use super::zone_rows::{ZoneRows, inner};
 use crate::math::{Vec3, add_scaled, scale};
@@ -30,7 +31,7 @@ const PROGRESS: f64 = 0.5;
 const TOLERANCE: f64 = 1e-13;
 
 /// Complementarity that is accepted where no more is to be had.
-const TRUSTED: f64 = 1e-4;
+pub(super) const TRUSTED: f64 = 1e-4;
 
 /// A projection with its multipliers: `y = A^T lambda`, `lambda >= 0`.
 pub(super) struct Unilateral {
@@ -42,17 +43,31 @@ pub(super) struct Unilateral {
 /// The smallest `y` with `A y >= demand`.
 ///
 /// The complementarity problem that simplex methods could not solve robustly [Harmon10, §3.5] is the projection onto a
-/// convex cone. The method of multipliers makes it a sequence of smooth convex problems, each solved by Newton steps
+/// convex cone. Few unknowns are a matter for [`active_set`]. Else the method of multipliers makes it a sequence of smooth convex problems, each solved by Newton steps
 /// (factored in the unknowns where that is cheap, else by conjugate gradients) with an exact line search; rows that repeat
 /// or contradict each other leave all of these well posed. Everything is in terms of what an update changes, so that
 /// rounding shrinks with it. Rows that cannot be met end at the work cap, near their least squares. Cost: at most 40
-/// updates, 200 Newton steps of a factorisation or 400 iterations.
-pub(super) fn unilateral(rows: &ZoneRows, demand: &[f64], factor: &mut Option<ZoneFactor>) -> Unilateral {
+/// updates, 200 Newton steps of a factorisation or 400 iterations. A guess of the multipliers saves most of that; it may
+/// be empty.
+pub(super) fn unilateral(
+    rows: &ZoneRows,
+    demand: &[f64],
+    guess: &[f64],
+    factor: &mut Option<ZoneFactor>,
+) -> Unilateral {
+    if let Some(solution) = active_set(rows, demand, guess) {
+        return solution;
+    }
     let size = demand.iter().fold(0.0_f64, |m, c| m.max(*c));
     let penalties: &[f64] = if factor.is_some() { &PENALTIES_FACTORED } else { &PENALTIES };
     let mut state = Multipliers::new(rows, demand);
-    let (mut steps, mut last) = (0, f64::INFINITY);
-    for update in 0..UPDATES {
+    let (mut steps, mut last, mut first) = (0, f64::INFINITY, 0);
+    if guess.iter().any(|l| *l > 0.0) {
+        state.lambda = guess.iter().map(|l| l.max(0.0)).collect();
+        state.renew(rows, demand);
+        first = penalties.len() / 2;
+    }
+    for update in first..UPDATES {
         let complementarity = state.complementarity() / size.max(f64::MIN_POSITIVE);
         if size == 0.0 || complementarity <= TOLERANCE {
             return state.finished(true);
@@ -133,9 +148,14 @@ impl Multipliers {
             pushes.iter_mut().zip(&speeds).for_each(|(push, speed)| *push += way * speed);
         }
         self.lambda.iter_mut().zip(&pushes).for_each(|(l, push)| *l = push.max(0.0));
+        self.renew(rows, demand);
+        steps
+    }
+
+    /// What follows from lambda.
+    fn renew(&mut self, rows: &ZoneRows, demand: &[f64]) {
         self.y = rows.transposed_product(&self.lambda);
         self.left = (0..rows.len()).map(|i| demand[i] - rows.product(i, &self.y)).collect();
-        steps
     }
 
     fn finished(self, converged: bool) -> Unilateral {

@@ -48,9 +48,41 @@ pub fn project_zone(
     response: &ZoneResponse,
     velocities: &mut [Vec3],
 ) -> Projection {
+    let targets: Vec<f64> = of.iter().map(|row| rows.normal_targets[*row]).collect();
+    let projected = project(rows, of, &targets, &vec![0.0; of.len()], metric, response);
+    projected.add_to(velocities);
+    projected.result
+}
+
+/// A projection that is not applied yet.
+pub(super) struct Projected {
+    blocks: ZoneBlocks,
+    y: Vec<Vec3>,
+    /// What it came to.
+    pub result: Projection,
+}
+
+impl Projected {
+    /// Applies it.
+    pub fn add_to(&self, velocities: &mut [Vec3]) {
+        self.blocks.add_to(&self.y, velocities);
+    }
+}
+
+/// [`project_zone`] with targets of its own, from a guess of the normal impulses.
+pub(super) fn project(
+    rows: &RowSet,
+    of: &[usize],
+    targets: &[f64],
+    guess: &[f64],
+    metric: &Metric,
+    response: &ZoneResponse,
+) -> Projected {
     let blocks = ZoneBlocks::new(rows, of, metric);
     let normals = ZoneRows::new(rows, of, 0..1, &blocks);
-    let demand: Vec<f64> = of.iter().zip(&normals.scales).map(|(row, s)| s * rows.normal_targets[*row]).collect();
+    let demand: Vec<f64> = targets.iter().zip(&normals.scales).map(|(target, s)| s * target).collect();
+    let inverse = |s: f64| if s > 0.0 { 1.0 / s } else { 0.0 };
+    let guess: Vec<f64> = guess.iter().zip(&normals.scales).map(|(g, s)| g * inverse(*s)).collect();
     let mut zone = Zone {
         y: vec![[0.0; 3]; normals.width],
         factor: ZoneFactor::new(&normals),
@@ -59,7 +91,7 @@ pub fn project_zone(
         unilateral: response.fail_safe != FailSafe::InelasticProjection,
         result: Projection { normal_impulses: vec![0.0; of.len()], ..Projection::default() },
     };
-    zone.respond();
+    zone.respond(&guess);
     // What cannot be met is answered otherwise anyway.
     let rubs = zone.result.converged && of.iter().any(|row| rows.friction[*row] > 0.0);
     match response.friction {
@@ -70,12 +102,12 @@ pub fn project_zone(
             let mut friction = ContactFriction::new(tangents, sliding, coefficients);
             for _ in 0..FRICTION_ROUNDS {
                 friction.apply(&zone.result.normal_impulses, &mut zone.y);
-                zone.respond();
+                zone.respond(&[]);
             }
         }
         ZoneFriction::PerZone if rubs => {
             zone.rub_as_one(rows, of, &blocks);
-            zone.respond();
+            zone.respond(&[]);
         }
         _ => {}
     }
@@ -83,8 +115,7 @@ pub fn project_zone(
         zone.result.rank = zone.result.normal_impulses.iter().filter(|impulse| **impulse > 0.0).count();
     }
     zone.result.residual = zone.residual();
-    blocks.add_to(&zone.y, velocities);
-    zone.result
+    Projected { blocks, y: zone.y, result: zone.result }
 }
 
 /// A projection under way.
@@ -101,16 +132,16 @@ struct Zone {
 }
 
 impl Zone {
-    /// Adds the smallest response that meets what is still wanted.
-    fn respond(&mut self) {
+    /// Adds the smallest response that meets what is still wanted; searched for from a guess of its multipliers.
+    fn respond(&mut self, guess: &[f64]) {
         let left: Vec<f64> =
             (0..self.demand.len()).map(|i| self.demand[i] - self.normals.product(i, &self.y)).collect();
         let (y, multipliers) = if self.unilateral {
-            let solution = unilateral(&self.normals, &left, &mut self.factor);
+            let solution = unilateral(&self.normals, &left, guess, &mut self.factor);
             self.result.converged = solution.converged;
             (solution.y, solution.multipliers)
         } else {
-            let solution = minimum_norm(&self.normals, &left);
+            let solution = minimum_norm(&self.normals, &left, &mut self.factor);
             self.result.rank = solution.rank;
             (solution.y, solution.multipliers)
         };

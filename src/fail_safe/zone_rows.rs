@@ -145,19 +145,6 @@ impl ZoneRows {
         }
         sum
     }
-
-    /// The rows named.
-    pub fn selected(&self, of: &[usize]) -> ZoneRows {
-        let mut out = ZoneRows { offsets: vec![0], width: self.width, ..ZoneRows::default() };
-        for i in of {
-            let range = self.offsets[*i]..self.offsets[*i + 1];
-            out.columns.extend_from_slice(&self.columns[range.clone()]);
-            out.entries.extend_from_slice(&self.entries[range]);
-            out.offsets.push(out.entries.len());
-            out.scales.push(self.scales[*i]);
-        }
-        out
-    }
 }
 
 /// `sum y_b · z_b`

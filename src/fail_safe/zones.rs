@@ -4,8 +4,8 @@
 use super::nodes::Nodes;
 use super::rigid_zone::move_zone;
 use super::sweep::Sweep;
-use super::zone_projection::{ZoneResponse, project_zone};
-use crate::constraint::{Linearisation, Metric, build_rows};
+use super::zone_projection::{Projected, ZoneResponse, project};
+use crate::constraint::{BuiltRows, Linearisation, Metric, build_rows};
 use crate::contact_search::{CandidateSearch, Contact, Hit, Pair};
 use crate::math::{Vec3, add, cross, mat_vec, sub};
 use crate::model::{FailSafe, State};
@@ -25,7 +25,7 @@ const ROWS_OF_PAIR: u32 = 4;
 const SQUEEZED: f64 = 0.6;
 
 /// How often a zone with rigid bodies is projected in a round, each time about the motion found last.
-const LINEARISATIONS: usize = 3;
+const LINEARISATIONS: usize = 2;
 
 /// What became of one zone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +34,7 @@ pub struct ZoneReport {
     pub nodes: u32,
     /// Scripted nodes that it touches: infinite masses.
     pub scripted: u32,
-    /// Collisions.
+    /// Collisions, and contacts among its nodes that were near when it was answered again.
     pub collisions: u32,
     /// What answered it in the end.
     pub fail_safe: FailSafe,
@@ -65,7 +65,7 @@ pub struct ZoneOutcome {
     pub rigid: u32,
     /// Rounds of continuous detection.
     pub rounds: u32,
-    /// Each zone, ordered by its first node.
+    /// Each zone that is not hit any more, ordered by its first node.
     pub reports: Vec<ZoneReport>,
 }
 
@@ -92,8 +92,14 @@ pub fn resolve_zones(
         if !zones.grow(&nodes, &outcome.hits, round >= PROJECTIONS) {
             break;
         }
+        if round == 1 && response.fail_safe == FailSafe::UnilateralProjection {
+            zones.near =
+                sweep.near(&outcome.end, candidates).into_iter().map(|contact| Near::new(contact, &nodes)).collect();
+        }
+        zones.take_near();
         let touched = zones.touched(&outcome.hits, &nodes);
-        answer(sweep, metric, &nodes, response, tentative, &touched, &mut outcome.velocities, &mut reports);
+        let impulses = &mut zones.impulses;
+        answer(sweep, metric, &nodes, response, tentative, &touched, impulses, &mut outcome.velocities, &mut reports);
         // A projection that scripted parts leave no room for is not tried again.
         let failed = |zone: &&Zone| reports.get(&zone.root).is_some_and(|report| !report.converged);
         touched.iter().filter(failed).for_each(|zone| zones.rigid[zone.root] = true);
@@ -106,8 +112,10 @@ pub fn resolve_zones(
             break;
         }
     }
-    // Zones that others took in are no zones any more.
-    outcome.reports = reports.into_iter().filter(|(root, _)| zones.root(*root) == *root).map(|(_, r)| r).collect();
+    // Zones that others took in are no zones any more, and those that are still hit have not resolved anything.
+    let left: Vec<usize> = zones.touched(&outcome.hits, &nodes).iter().map(|zone| zone.root).collect();
+    let mut resolved = |root: usize| zones.root(root) == root && !left.contains(&root);
+    outcome.reports = reports.into_iter().filter(|(root, _)| resolved(*root)).map(|(_, r)| r).collect();
     outcome.rigid = outcome.reports.iter().filter(|r| r.fail_safe == FailSafe::RigidZone).count() as u32;
     outcome.projected = outcome.reports.len() as u32 - outcome.rigid;
     outcome
@@ -122,9 +130,38 @@ struct Zone {
     /// Scripted nodes of its collisions, ascending.
     scripted: Vec<usize>,
     contacts: Vec<Contact>,
+    /// Numbers of its collisions.
+    collisions: Vec<usize>,
 }
 
-/// Answers the zones given, each from `tentative`, in `velocities`.
+/// The projection of one zone.
+struct Task<'a> {
+    zone: &'a Zone,
+    /// Its rows.
+    of: Vec<usize>,
+    /// Guess of their normal impulses.
+    guess: Vec<f64>,
+    projected: Option<Projected>,
+}
+
+impl Task<'_> {
+    fn run(&mut self, built: &BuiltRows, gaps: &[f64], metric: &Metric, response: &ZoneResponse, dt: f64) {
+        let rows = &built.rows;
+        let mut targets: Vec<f64> = self.of.iter().map(|row| rows.normal_targets[*row]).collect();
+        let mut projected = project(rows, &self.of, &targets, &self.guess, metric, response);
+        if !projected.result.converged && response.fail_safe == FailSafe::UnilateralProjection {
+            // Thickness gives way first.
+            for (target, row) in targets.iter_mut().zip(&self.of) {
+                *target -= (1.0 - SQUEEZED) * gaps[built.contact[*row] as usize] / dt;
+            }
+            projected = project(rows, &self.of, &targets, &projected.result.normal_impulses, metric, response);
+        }
+        self.projected = Some(projected);
+    }
+}
+
+/// Answers the zones given, each from `tentative`, in `velocities`; `impulses` per collision are guesses before and found
+/// after.
 fn answer(
     sweep: &Sweep,
     metric: &Metric,
@@ -132,6 +169,7 @@ fn answer(
     response: &ZoneResponse,
     tentative: &[Vec3],
     zones: &[Zone],
+    impulses: &mut [f64],
     velocities: &mut [Vec3],
     reports: &mut BTreeMap<usize, ZoneReport>,
 ) {
@@ -163,24 +201,28 @@ fn answer(
         segment.end_state(velocities, 1.0, false, &mut end);
         let (start, dt) = (segment.start, segment.dt);
         let about = Linearisation { start, end: &end, velocities, unconstrained: tentative, dt };
-        let mut built = build_rows(segment.model, metric, &contacts, &gaps, &frames, &about);
-        let mut first = 0;
+        let built = build_rows(segment.model, metric, &contacts, &gaps, &frames, &about);
+        let (mut first, mut tasks) = (0, Vec::with_capacity(projected.len()));
         for zone in &projected {
             let last = first + zone.contacts.len() as u32;
             let row = |contact: u32| built.contact.partition_point(|c| *c < contact);
             let of: Vec<usize> = (row(first)..row(last)).collect();
+            let collision = |row: &usize| zone.collisions[(built.contact[*row] - first) as usize];
+            let guess = of.iter().map(|row| impulses[collision(row)]).collect();
             first = last;
+            tasks.push(Task { zone, of, guess, projected: None });
+        }
+        sweep.par.for_each_task(&mut tasks, |task| task.run(&built, &gaps, metric, response, dt));
+        let mut first = 0;
+        for Task { zone, of, projected, .. } in tasks {
+            let Some(projected) = projected else { continue };
             reset(nodes, zone, tentative, velocities);
-            let mut projection = project_zone(&built.rows, &of, metric, response, velocities);
-            if !projection.converged && response.fail_safe == FailSafe::UnilateralProjection {
-                // Thickness gives way first.
-                for row in &of {
-                    let gap = gaps[built.contact[*row] as usize];
-                    built.rows.normal_targets[*row] -= (1.0 - SQUEEZED) * gap / dt;
-                }
-                reset(nodes, zone, tentative, velocities);
-                projection = project_zone(&built.rows, &of, metric, response, velocities);
+            projected.add_to(velocities);
+            let projection = projected.result;
+            for (row, impulse) in of.iter().zip(&projection.normal_impulses) {
+                impulses[zone.collisions[(built.contact[*row] - first) as usize]] = *impulse;
             }
+            first += zone.contacts.len() as u32;
             let mut report = report_of(zone, response.fail_safe);
             report.rank = projection.rank as u32;
             (report.residual, report.converged) = (projection.residual, projection.converged);
@@ -249,6 +291,20 @@ struct Collision {
     scripted: Vec<usize>,
 }
 
+/// A contact that is close at the start.
+struct Near {
+    contact: Contact,
+    movable: Vec<usize>,
+    taken: bool,
+}
+
+impl Near {
+    fn new(contact: Contact, nodes: &Nodes) -> Near {
+        let movable = nodes.of_pair(&contact.pair).into_iter().filter(|n| !nodes.is_scripted(*n)).collect();
+        Near { contact, movable, taken: false }
+    }
+}
+
 /// Disjoint sets of movable nodes, and the collisions that made them.
 struct Zones {
     parent: Vec<usize>,
@@ -258,6 +314,9 @@ struct Zones {
     /// Nodes in zones, in the order of joining.
     joined: Vec<usize>,
     collisions: Vec<Collision>,
+    /// Normal impulse of each collision as projected last `[N s]`.
+    impulses: Vec<f64>,
+    near: Vec<Near>,
     rows_of_pair: BTreeMap<Pair, u32>,
 }
 
@@ -269,6 +328,8 @@ impl Zones {
             rigid: vec![always_rigid; count],
             joined: Vec::new(),
             collisions: Vec::new(),
+            impulses: Vec::new(),
+            near: Vec::new(),
             rows_of_pair: BTreeMap::new(),
         }
     }
@@ -318,9 +379,31 @@ impl Zones {
             let rigid = self.rigid[root];
             progress |= merged || !rigid || scripted.iter().any(|node| !self.touches(root, *node));
             self.rigid[root] |= make_rigid || contact.ordinal >= ROWS_OF_PAIR;
-            self.collisions.push(Collision { contact, node: movable[0], scripted });
+            self.push(Collision { contact, node: movable[0], scripted });
         }
         progress
+    }
+
+    fn push(&mut self, collision: Collision) {
+        self.collisions.push(collision);
+        self.impulses.push(0.0);
+    }
+
+    /// Takes in what is near and lies within one zone: what is pushed there would hit it next.
+    fn take_near(&mut self) {
+        for k in 0..self.near.len() {
+            let Near { contact, ref movable, taken } = self.near[k];
+            let Some(node) = movable.first().copied().filter(|_| !taken) else { continue };
+            if movable.iter().any(|n| !self.in_zone[*n]) {
+                continue;
+            }
+            let movable = movable.clone();
+            let root = self.root(node);
+            if movable.iter().all(|n| self.root(*n) == root) {
+                self.near[k].taken = true;
+                self.push(Collision { contact, node, scripted: Vec::new() });
+            }
+        }
     }
 
     /// Whether a zone has a collision with a scripted node.
@@ -336,7 +419,8 @@ impl Zones {
             let Some(node) = nodes.of_pair(&hit.pair).into_iter().find(|n| !nodes.is_scripted(*n)) else { continue };
             let (root, movable) = (self.root(node), Vec::new());
             let rigid = self.rigid[root];
-            let zone = Zone { root, rigid, movable, scripted: Vec::new(), contacts: Vec::new() };
+            let (scripted, contacts) = (Vec::new(), Vec::new());
+            let zone = Zone { root, rigid, movable, scripted, contacts, collisions: Vec::new() };
             zones.entry(root).or_insert(zone);
         }
         for k in 0..self.joined.len() {
@@ -349,6 +433,7 @@ impl Zones {
             let root = self.root(self.collisions[k].node);
             if let Some(zone) = zones.get_mut(&root) {
                 zone.contacts.push(self.collisions[k].contact);
+                zone.collisions.push(k);
                 zone.scripted.extend_from_slice(&self.collisions[k].scripted);
             }
         }

@@ -108,7 +108,7 @@ mod tests {
             body(1, point, Kind::Deformable { masses: vec![1.0], pinned: vec![false] }),
             body(2, Surface::default(), Kind::HalfSpace(plane)),
         ];
-        let material = Material { friction_coefficient: 0.5, combine_rule: Default::default() };
+        let material = Material { friction_coefficient: 0.5, combine_rule: Default::default(), restitution: 0.0 };
         Model::build(bodies, Materials { list: vec![material], overrides: vec![] }, vec![]).unwrap()
     }
 

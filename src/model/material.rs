@@ -23,6 +23,8 @@ pub struct Material {
     pub friction_coefficient: f64,
     /// Rule used with another material; the rule with the larger ordinal of the two wins.
     pub combine_rule: CombineRule,
+    /// Coefficient of restitution of collisions, 0 to 1: a pair has the greater of two. Read by the velocity filter.
+    pub restitution: f64,
 }
 
 /// All materials of a model, and the pairs that override the combine rule.
@@ -35,6 +37,12 @@ pub struct Materials {
 }
 
 impl Materials {
+    /// Coefficient of restitution between two materials: the greater of theirs, so that a ball that bounces does so on any
+    /// floor.
+    pub fn restitution(&self, a: u32, b: u32) -> f64 {
+        self.list[a as usize].restitution.max(self.list[b as usize].restitution)
+    }
+
     /// Friction coefficient between two materials.
     pub fn friction_coefficient(&self, a: u32, b: u32) -> f64 {
         let key = (a.min(b), a.max(b));
@@ -60,7 +68,7 @@ mod tests {
 
     #[test]
     fn overrides_win_over_the_combine_rule() {
-        let m = |f, rule| Material { friction_coefficient: f, combine_rule: rule };
+        let m = |f, rule| Material { friction_coefficient: f, combine_rule: rule, restitution: 0.5 * f };
         let materials = Materials {
             list: vec![m(0.4, CombineRule::GeometricMean), m(0.9, CombineRule::Minimum)],
             overrides: vec![(0, 0, 0.05)],
@@ -68,5 +76,7 @@ mod tests {
         assert_eq!(materials.friction_coefficient(0, 0), 0.05);
         assert_eq!(materials.friction_coefficient(1, 0), 0.4);
         assert_eq!(materials.friction_coefficient(1, 1), 0.9);
+        assert_eq!((materials.restitution(0, 0), materials.restitution(0, 1)), (0.2, 0.45));
+        assert_eq!(materials.restitution(1, 0), 0.45);
     }
 }

@@ -98,7 +98,8 @@ impl Default for Ablation {
 /// What only [`Method::VelocityFilter`] reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSettings {
-    /// Coefficient of restitution of impulses, 0 to 1: the share of its normal velocity with which a collision parts.
+    /// Coefficient of restitution, 0 to 1, that collisions have at least: the share of its normal velocity with which one
+    /// parts is the greatest of this and of its materials'.
     pub restitution: f64,
     /// Stiffness k of the springs between what is closer than its thickness, at least 0, in units of the contact's
     /// effective mass over `dt^2`: 1 makes up for the whole overlap within a step, before the cap on the separation that it

@@ -187,7 +187,7 @@ mod tests {
     }
 
     fn build(bodies: Vec<BodyDescription>, systems: Vec<SystemDescription>) -> Result<Model, BuildError> {
-        let material = Material { friction_coefficient: 0.5, combine_rule: Default::default() };
+        let material = Material { friction_coefficient: 0.5, combine_rule: Default::default(), restitution: 0.0 };
         Model::build(bodies, Materials { list: vec![material], overrides: vec![] }, systems)
     }
 

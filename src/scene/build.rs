@@ -229,8 +229,8 @@ impl Scene {
 struct Builder<'a> {
     scene: Scene,
     folder: &'a Path,
-    /// Ids by friction coefficient.
-    materials: Vec<(u64, f64)>,
+    /// Materials with their ids.
+    materials: Vec<(u64, Material)>,
     jitter_seed: u64,
     jitter: Option<f64>,
 }
@@ -422,16 +422,16 @@ impl Builder<'_> {
         Ok(mesh)
     }
 
-    /// One material per friction coefficient; a pair has the geometric mean.
+    /// One material per pair of coefficients; a pair has the geometric mean of frictions.
     fn options(&mut self, contact: &Contact, at: &str) -> Result<BodyOptions, FieldFault> {
-        let known = self.materials.iter().find(|(_, friction)| *friction == contact.friction).map(|(id, _)| *id);
+        let (friction_coefficient, restitution) = (contact.friction, contact.restitution);
+        let material = Material { friction_coefficient, combine_rule: CombineRule::GeometricMean, restitution };
+        let known = self.materials.iter().find(|(_, known)| *known == material).map(|(id, _)| *id);
         let material = match known {
             Some(id) => id,
             None => {
-                let material =
-                    Material { friction_coefficient: contact.friction, combine_rule: CombineRule::GeometricMean };
                 let id = self.scene.world.add_material(material).map_err(|e| refused(at, &e))?;
-                self.materials.push((id, contact.friction));
+                self.materials.push((id, material));
                 id
             }
         };

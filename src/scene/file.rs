@@ -144,6 +144,7 @@ pub struct BodyBound {
 #[derive(Clone, Debug)]
 pub struct Contact {
     pub friction: f64,
+    pub restitution: f64,
     pub half_thickness: Option<f64>,
     pub groups: Vec<u32>,
     pub mask: Option<Vec<u32>>,
@@ -159,6 +160,8 @@ macro_rules! body_table {
             pub name: String,
             #[serde(default)]
             pub friction: f64,
+            #[serde(default)]
+            pub restitution: f64,
             pub half_thickness: Option<f64>,
             #[serde(default)]
             pub groups: Vec<u32>,
@@ -173,6 +176,7 @@ macro_rules! body_table {
             pub fn contact(&self) -> Contact {
                 Contact {
                     friction: self.friction,
+                    restitution: self.restitution,
                     half_thickness: self.half_thickness,
                     groups: self.groups.clone(),
                     mask: self.mask.clone(),
@@ -182,6 +186,10 @@ macro_rules! body_table {
 
             fn check_contact(&self, at: &str) -> Result<(), FieldFault> {
                 not_negative(self.friction, at, "friction")?;
+                if !(0.0..=1.0).contains(&self.restitution) {
+                    let message = format!("between 0 and 1, not {}", self.restitution);
+                    return Err(FieldFault::new(format!("{at}.restitution"), message));
+                }
                 if let Some(half) = self.half_thickness {
                     not_negative(half, at, "half_thickness")?;
                 }

@@ -57,7 +57,8 @@ pub(super) fn fall_back(
         let part = Box::new(replaced(around, part, zones.velocities, zones.end));
         return FallBack::Resolved { part, projected, rigid, held_vertices: 0, momentum_taken };
     }
-    let holding = hold(&sweep, metric, &part.velocities, &part.hits, candidates);
+    // From what zones left: those that are clean stay resolved.
+    let holding = hold(&sweep, metric, &zones.velocities, &zones.hits, candidates);
     if holding.hits.is_empty() {
         let nodes = Nodes::new(segment.model, metric);
         let momentum_taken = momentum_lost(segment.model, around, &part.velocities, &holding.velocities);
@@ -66,7 +67,7 @@ pub(super) fn fall_back(
             held_vertices += nodes.body(*node).map_or(1, |body| segment.model.bodies[body].vertices.len() as u32);
         }
         let part = Box::new(replaced(around, part, holding.velocities, holding.end));
-        return FallBack::Resolved { part, projected: 0, rigid: 0, held_vertices, momentum_taken };
+        return FallBack::Resolved { part, projected, rigid, held_vertices, momentum_taken };
     }
     let (share, state) = certified_share(&sweep, &holding.velocities, &holding.hits, candidates);
     FallBack::Pinched { share, state: Box::new(state), hits: holding.hits }

@@ -4,7 +4,7 @@ use super::motion::FilteredMotion;
 use super::stage_rows::StageRows;
 use crate::contact_search::{BodyFilter, CandidateSearch, Contact, Hit, Passing, renewed_hits, swept_hits};
 use crate::math::Vec3;
-use crate::model::{Phase, Segment, StepError, StepReport};
+use crate::model::{Model, Phase, Segment, StepError, StepReport};
 use crate::step::{Surroundings, lap};
 use std::time::Instant;
 
@@ -36,7 +36,8 @@ pub fn iterate_impulses(
         let contacts = in_order_of_time(hits);
         let mut rows = motion.rows(&contacts);
         for row in 0..rows.len() {
-            reflect(&mut rows, row, filter.restitution);
+            let contact = &contacts[rows.built.contact[row] as usize];
+            reflect(&mut rows, row, restitution(segment.model, contact, filter.restitution));
         }
         let given = motion.take(&contacts, pass, rows);
         report.iterations += given;
@@ -46,6 +47,12 @@ pub fn iterate_impulses(
         }
     }
     Ok(detection.hits.unwrap_or_default())
+}
+
+/// Coefficient of restitution of a contact: of its materials, `least` at least.
+fn restitution(model: &Model, contact: &Contact, least: f64) -> f64 {
+    let [a, b] = contact.pair.bodies(model).map(|body| model.bodies[body].description.material);
+    model.materials.restitution(a, b).max(least)
 }
 
 /// The impulse of a row that approaches: its normal velocity is reflected by `restitution`, friction stops its sliding as

@@ -4,7 +4,23 @@ use super::{Fault, World, WorldError, ids};
 use crate::model::{CombineRule, Material, Materials};
 
 /// What bodies without a material have: no friction against anything.
-const FRICTIONLESS: Material = Material { friction_coefficient: 0.0, combine_rule: CombineRule::Product };
+const FRICTIONLESS: Material =
+    Material { friction_coefficient: 0.0, combine_rule: CombineRule::Product, restitution: 0.0 };
+
+fn check(material: &Material) -> Result<(), WorldError> {
+    checked_friction(material.friction_coefficient)?;
+    let restitution = material.restitution;
+    if !restitution.is_finite() {
+        return Err(
+            WorldError::new(Fault::NonFinite, "the coefficient of restitution is not finite").value(restitution)
+        );
+    }
+    if !(0.0..=1.0).contains(&restitution) {
+        let message = format!("the coefficient of restitution {restitution} is not in 0 to 1");
+        return Err(WorldError::new(Fault::InvalidArgument, message).value(restitution));
+    }
+    Ok(())
+}
 
 fn checked_friction(friction: f64) -> Result<f64, WorldError> {
     if !friction.is_finite() {
@@ -20,7 +36,7 @@ fn checked_friction(friction: f64) -> Result<f64, WorldError> {
 impl World {
     /// Adds a material.
     pub fn add_material(&mut self, material: Material) -> Result<u64, WorldError> {
-        checked_friction(material.friction_coefficient)?;
+        check(&material)?;
         let id = self.materials.insert_with(|_| Ok(material))?;
         self.model_current = false;
         Ok(id)
@@ -28,7 +44,7 @@ impl World {
 
     /// Changes a material.
     pub fn set_material_values(&mut self, id: u64, material: Material) -> Result<(), WorldError> {
-        checked_friction(material.friction_coefficient)?;
+        check(&material)?;
         *self.materials.get_mut(id)? = material;
         self.model_current = false;
         Ok(())

@@ -130,8 +130,11 @@ impl MotionFilter {
         whole.vertices.iter().for_each(|v| parts[body_of(*v)].topology.points.push(named(*v)));
         let bodies: Result<Vec<BodyDescription>, WorldError> =
             parts.into_iter().enumerate().map(|(index, part)| part.body(index, &description)).collect();
-        let material =
-            Material { friction_coefficient: description.friction_coefficient, combine_rule: Default::default() };
+        let material = Material {
+            friction_coefficient: description.friction_coefficient,
+            combine_rule: Default::default(),
+            restitution: 0.0,
+        };
         let materials = Materials { list: vec![material], overrides: Vec::new() };
         let model = Model::build(bodies?, materials, Vec::new()).map_err(|error| {
             WorldError::new(Fault::InvalidArgument, error.message).index(error.index).value(error.value)

@@ -25,7 +25,7 @@ use crate::step::Carried;
 use std::sync::Arc;
 
 /// Version of the format that is written, and the only one that is read.
-pub const SNAPSHOT_FORMAT: u32 = 2;
+pub const SNAPSHOT_FORMAT: u32 = 3;
 
 const MAGIC: [u8; 8] = *b"SGNSNAP\0";
 
@@ -48,7 +48,7 @@ archive_enum!(CombineRule {
 archive_struct!(Pose { position, orientation });
 archive_struct!(HalfSpace { normal, offset });
 archive_struct!(Surface { rest, vertices, edges, faces });
-archive_struct!(Material { friction_coefficient, combine_rule });
+archive_struct!(Material { friction_coefficient, combine_rule, restitution });
 archive_struct!(ContactKey { bodies, kind, features, ordinal });
 archive_struct!(RememberedContact { key, impulse, tangent });
 archive_struct!(ContactRecord { bodies, kind, features, weights, point, normal, distance, impulse, state, key });

@@ -104,7 +104,7 @@ fn model() -> Model {
     rigid.key = 3;
     rigid.kind = Kind::Rigid { mass: 1.0, inertia: mat_scale(1e-3, &IDENTITY) };
     rigid.dynamics = Some(Arc::new(Dynamics::Rigid { linear_damping: 0.0, angular_damping: 0.0 }));
-    let material = Material { friction_coefficient: 0.5, combine_rule: Default::default() };
+    let material = Material { friction_coefficient: 0.5, combine_rule: Default::default(), restitution: 0.0 };
     Model::build(vec![cloth, solid, rigid], Materials { list: vec![material], overrides: vec![] }, vec![]).unwrap()
 }
 

@@ -26,8 +26,9 @@ fn corners(size: f64) -> Vec<Vec3> {
 
 fn scene() -> Scene {
     let mut world = World::new();
-    let material =
-        world.add_material(Material { friction_coefficient: 0.4, combine_rule: Default::default() }).unwrap();
+    let material = world
+        .add_material(Material { friction_coefficient: 0.4, combine_rule: Default::default(), restitution: 0.0 })
+        .unwrap();
     let options = BodyOptions { half_thickness: Some(0.005), material, ..BodyOptions::default() };
     let n = 5u32;
     let positions: Vec<Vec3> =

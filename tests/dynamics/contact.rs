@@ -58,8 +58,9 @@ fn rigid_box(at: Vec3, own: bool) -> RigidDescription {
 fn pile() -> (World, Vec<u64>) {
     let mut world = World::new();
     world.set_gravity(GRAVITY).unwrap();
-    let material =
-        world.add_material(Material { friction_coefficient: 0.4, combine_rule: Default::default() }).unwrap();
+    let material = world
+        .add_material(Material { friction_coefficient: 0.4, combine_rule: Default::default(), restitution: 0.0 })
+        .unwrap();
     let floor = BodyOptions { half_thickness: Some(0.0), material, ..options() };
     world.add_half_space(floor, FLOOR).unwrap();
     let mut ids = Vec::new();

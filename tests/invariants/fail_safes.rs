@@ -5,7 +5,7 @@ use signorini::constraint::Metric;
 use signorini::contact_search::{BodyFilter, CandidateSearch, Passing, intersections};
 use signorini::fail_safe::{Sweep, ZoneOutcome, ZoneResponse, hold, resolve_zones};
 use signorini::math::{norm, sub};
-use signorini::model::{FailSafe, Segment, StepError, ZoneFriction};
+use signorini::model::{FailSafe, Method, Segment, StepError, ZoneFriction};
 use signorini::parallel::Par;
 
 fn crude(world: &mut World) {
@@ -276,4 +276,46 @@ fn zones_that_share_a_script_only_are_apart() {
         assert_eq!(outcome.reports.len(), count, "every vertex strikes the ground on its own: {:?}", outcome.reports);
         assert!(outcome.hits.is_empty() && outcome.reports.iter().all(|r| r.scripted == 1 && r.nodes == 1));
     }
+}
+
+#[test]
+fn holding_keeps_zones_that_came_clean() {
+    // A cloth between plates that slide past each other, where rigid zones break down; aside, two sheets that one resolves.
+    let mut cases = 0;
+    for dz in [0.004, 0.005, 0.006, 0.0067] {
+        let mut plan = Plan::rubbing(0.0);
+        let cloth = sheet(8, 0.3);
+        plan.cloth(&cloth, moved(&cloth, [0.0; 3], &mut Jitter(2), 1e-4), 0.1, &[], [0.0, 0.0, 0.09]);
+        let upper = plan.scripted(&block([0.5, 0.5, 0.02]), at([0.0, 0.003, 0.018]));
+        let lower = plan.scripted(&block([0.5, 0.5, 0.02]), at([0.002, 0.0, -0.018]));
+        let mut pair = Vec::new();
+        for (z, v) in [(0.0, 6.0), (0.03, -6.0)] {
+            let start = moved(&cloth, [2.0, 0.0, z], &mut Jitter(3), 0.002);
+            pair.push(plan.cloth(&cloth, start, 0.1, &[], [0.3, 0.0, v]));
+        }
+        let mut world = plan.build();
+        world.settings.method = Method::VelocityFilter;
+        world.settings.filter.passes_max = 0;
+        world.settings.fail_safe = FailSafe::RigidZone;
+        world.prepare();
+        for (key, x) in [(upper, 0.02), (lower, -0.02)] {
+            let mut pose = world.pose(key);
+            pose.position[0] += x;
+            pose.position[2] -= x.signum() * dz;
+            world.script(key, pose);
+        }
+        let Ok(report) = world.advance(Par::Serial) else { continue };
+        if report.held_vertices == 0 {
+            continue;
+        }
+        cases += 1;
+        assert!(report.rigid_zones > 0 && report.held_vertices <= cloth.positions.len() as u32, "{dz}: {report:?}");
+        for key in pair {
+            for block in world.body(key).blocks.clone() {
+                let v = world.result.velocities[block];
+                assert!(v[0] > 0.1 && v[2].abs() < 7.0, "{dz}: the sheets aside move on: {v:?}");
+            }
+        }
+    }
+    assert!(cases > 0, "nothing was held");
 }

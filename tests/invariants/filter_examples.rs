@@ -3,7 +3,7 @@
 use crate::support::shapes::Triangles;
 use crate::world::*;
 use signorini::math::{norm, sub};
-use signorini::model::Method;
+use signorini::model::{Material, Method};
 use signorini::parallel::Par;
 
 fn particle() -> Triangles {
@@ -111,5 +111,31 @@ fn end_velocities_follow_the_filtered_mean() {
         assert!(norm(sub(filtered, *v)) < 1e-12, "{filtered:?} {v:?}");
         let gained = world.result.impulses[block].map(|f| f / (0.1 / 36.0));
         assert!(norm(sub(sub(*v, mean[block]), gained)) < 1e-9);
+    }
+}
+
+/// A ball that falls straight on a floor leaves it by the greatest of three: its own restitution, the floor's, the step's.
+#[test]
+fn a_ball_bounces_by_the_greater_restitution() {
+    for (of_ball, of_floor, of_step, expected) in
+        [(0.8, 0.2, 0.0, 0.8), (0.2, 0.8, 0.0, 0.8), (0.2, 0.2, 0.0, 0.2), (0.8, 0.2, 0.9, 0.9), (0.0, 0.0, 0.0, 0.0)]
+    {
+        let mut plan = Plan::rubbing(0.5);
+        let ball = plan.rigid(&ball(0.05), at([0.0, 0.0, 0.06]), 1.0, diagonal(0.001), [0.0, 0.0, -3.0], [0.0; 3]);
+        let floor = plan.half_space([0.0, 0.0, 1.0], 0.0);
+        let mut world = plan.build();
+        let first = world.model.materials.list[0];
+        world.model.materials.list = [of_ball, of_floor].map(|e| Material { restitution: e, ..first }).to_vec();
+        for (key, material) in [(ball, 0), (floor, 1)] {
+            let body = world.model.body_index(key).unwrap();
+            world.model.bodies[body].description.material = material;
+        }
+        world.settings.method = Method::VelocityFilter;
+        world.settings.filter.restitution = of_step;
+        let report = world.step();
+        assert_eq!(report.rounds, 2, "{report:?}");
+        let [x, y, z] = world.result.end_velocities[world.body(ball).blocks.start];
+        let at = format!("{of_ball} on {of_floor}, {of_step}: {z}");
+        assert!((z - 3.0 * expected).abs() < 1e-12 && x.hypot(y) < 1e-12, "{at}");
     }
 }

@@ -66,7 +66,7 @@ impl Mesh {
             embedding: None,
             dynamics: None,
         };
-        let material = Material { friction_coefficient: 0.0, combine_rule: Default::default() };
+        let material = Material { friction_coefficient: 0.0, combine_rule: Default::default(), restitution: 0.0 };
         let model = Model::build(vec![body], Materials { list: vec![material], overrides: vec![] }, vec![]).unwrap();
         let state = State { positions: x.to_vec(), ..model.rest_state() };
         intersections(&model, &BodyFilter::new(&model), &state, Par::Serial).witnesses.len()

@@ -122,7 +122,8 @@ impl Plan {
     }
 
     pub fn build(self) -> World {
-        let material = Material { friction_coefficient: self.friction, combine_rule: CombineRule::default() };
+        let material =
+            Material { friction_coefficient: self.friction, combine_rule: CombineRule::default(), restitution: 0.0 };
         let materials = Materials { list: vec![material], overrides: Vec::new() };
         let model = Model::build(self.bodies, materials, Vec::new()).expect("a valid model");
         let mut state = model.rest_state();

@@ -323,7 +323,7 @@ fn parallel_edges_keep_their_distance_where_the_cross_product_vanishes() {
         let (x, y) = (-1.0 + 0.1 * f64::from(i), 0.1 * f64::from(j));
         let points = [[0.0; 3], [0.0, 1.0, 0.0], [x, 0.0, 0.0], [1.0, 1.0, y]];
         let bodies = vec![body(1, surface(points[0], points[1])), body(2, surface(points[2], points[3]))];
-        let material = Material { friction_coefficient: 0.0, combine_rule: Default::default() };
+        let material = Material { friction_coefficient: 0.0, combine_rule: Default::default(), restitution: 0.0 };
         let materials = Materials { list: vec![material], overrides: vec![] };
         let model = Model::build(bodies, materials, vec![]).unwrap();
         let pair = Pair { kind: PairKind::EdgeEdge, features: [0, 1] };

@@ -91,8 +91,10 @@ pub fn assemble(
             dynamics: None,
         });
     }
-    let list =
-        frictions.iter().map(|f| Material { friction_coefficient: *f, combine_rule: CombineRule::default() }).collect();
+    let list = frictions
+        .iter()
+        .map(|f| Material { friction_coefficient: *f, combine_rule: CombineRule::default(), restitution: 0.0 })
+        .collect();
     let mut systems = Vec::new();
     if stiffness > 0.0 {
         systems.extend(pattern(&descriptions));
