@@ -31,3 +31,22 @@ fn friction_slows_the_ribbon_and_holds_it() {
     let ways: Vec<f64> = coefficients.iter().map(way).collect();
     assert!(ways.is_sorted_by(|a, b| *a > 1.1 * b), "{ways:?}");
 }
+
+/// A hand that closes farther than the cloth in it leaves room for: the steps that press end pinched and name the cloth
+/// and the fingers; then the hand opens, and the cloth lies free.
+#[test]
+fn a_hand_that_closes_too_far_pinches_and_opens_again() {
+    let folder = Folder::new("hand");
+    // Pressing takes a second or two a step, so that it is left to the slow tests to press on.
+    let line = run(&folder, "hand", if all() { &[] } else { &["--steps", "192"] });
+    let pinches = line["pinches"].as_array().expect("a list");
+    assert!(!pinches.is_empty(), "{line}");
+    for pinch in pinches {
+        let names: Vec<&str> =
+            pinch["bodies"].as_array().expect("two").iter().filter_map(|name| name.as_str()).collect();
+        assert!(names.len() == 2 && names.contains(&"cloth"), "{pinch}");
+        let last = pinch["last_step"].as_u64();
+        assert!(pinch["first_step"].as_u64() > Some(150) && last < Some(260), "{pinch}");
+    }
+    assert_eq!(line["free_vertices"].as_u64(), Some(525));
+}

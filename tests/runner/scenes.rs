@@ -49,13 +49,18 @@ scenes! {
     arch 100, all: 10 x 400;
     arch_falling 100, all: 10 x 400;
     bars 100, all: 10 x 100;
+    cape 100, all: 3 x 450;
     card_house 100, all: 10 x 400;
     card_pair 100, all: 10 x 400;
     card_pair_sliding 100, all: 10 x 400;
     crumple 25, all: 3 x 150;
+    crushed_cylinder 250, all: 10 x 1000;
     drape 35, all: 4 x 300;
     falling_cloth 30, all: 2 x 200;
     falling_cloth_rough 30, all: 2 x 200;
+    funnel 12, all: 1 x 150;
+    funnel_coarse 25, all: 1 x 500;
+    hand 100, all: 3 x 350;
     incline 200, all: 10 x 200;
     incline_sticking 200, all: 10 x 200;
     layered_dress 20, all: 1 x 200;
@@ -66,6 +71,7 @@ scenes! {
     ribbon 150, all: 3 x 1000;
     ring_shot 12, all: 4 x 100;
     rolling_sphere 60, all: 10 x 500;
+    sheets 30, all: 1 x 300;
     soft_pile 6, all: 2 x 100;
     soft_pile_soft 6, all: 1 x 100;
     soft_pile_stiff 6, all: 1 x 100;
