@@ -4,7 +4,8 @@
 //! tree kept from call to call; the best of the calls after the first. A share of a flat cloth is sent through scripted
 //! cloth right below it, the rest freely down; everything drifts, so that no box of the call before holds.
 //! Words: `quick` (to 1e4 vertices), `recorded` (displacement mode: the start is known to be clean), `projections` (no
-//! passes of impulses), `inelastic`, `rigid`, `vertices=N share=S` for one scene, 40 calls.
+//! passes of impulses), `inelastic`, `rigid`, `vertices=N share=S` for one scene, 40 calls; `write=DIR`: the motions of
+//! 10,000 vertices and what becomes of them, for `benches/peers/step_size.py`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 #[allow(dead_code, unused_imports)]
@@ -14,6 +15,7 @@ use signorini::math::{Vec3, add};
 use signorini::model::{FailSafe, Precision, Settings, StepReport, Watch};
 use signorini::parallel::Par;
 use signorini::world::{Motion, MotionFilter, MotionFilterDescription, Topology};
+use std::path::Path;
 use support::clock::thread_seconds;
 use support::random::Random;
 use support::shapes::{Triangles, cloth_grid};
@@ -58,8 +60,16 @@ fn scene(count: usize, share: f64) -> Scene {
     scene
 }
 
-/// Seconds of the best call, and its report.
-fn measure(scene: &Scene, settings: &Settings, calls: usize, recorded: bool) -> (f64, StepReport) {
+/// What calls on a scene came to.
+struct Measured {
+    /// Processor seconds of the best call, and its report.
+    seconds: f64,
+    report: StepReport,
+    /// Positions before, wished and found of the last call.
+    motion: [Vec<Vec3>; 3],
+}
+
+fn measure(scene: &Scene, settings: &Settings, calls: usize, recorded: bool) -> Measured {
     let mut filter = MotionFilter::new(MotionFilterDescription {
         rest: scene.x.clone(),
         topology: Topology { triangles: scene.triangles.clone(), ..Topology::default() },
@@ -73,13 +83,14 @@ fn measure(scene: &Scene, settings: &Settings, calls: usize, recorded: bool) -> 
     .unwrap();
     let mut seconds = Vec::new();
     let mut last = StepReport::default();
+    let mut motion = Default::default();
     for call in 0..calls {
         let drift = [0.3 * EDGE * call as f64, 0.2 * EDGE * call as f64, 0.0];
         let x0: Vec<Vec3> = scene.x.iter().map(|x| add(*x, drift)).collect();
         let x1: Vec<Vec3> = x0.iter().zip(&scene.way).map(|(x, w)| add(*x, *w)).collect();
         let from = thread_seconds();
-        let motion = if recorded { Motion::Displacement(&x0, &x1) } else { Motion::Between(&x0, &x1) };
-        let report = filter.run(motion, settings, DT, Par::Serial, Watch::default());
+        let wish = if recorded { Motion::Displacement(&x0, &x1) } else { Motion::Between(&x0, &x1) };
+        let report = filter.run(wish, settings, DT, Par::Serial, Watch::default());
         seconds.push(thread_seconds() - from);
         let report = report.unwrap_or_else(|failure| panic!("{:?}", failure.error));
         assert_eq!(report.intersections, Some(0));
@@ -87,8 +98,26 @@ fn measure(scene: &Scene, settings: &Settings, calls: usize, recorded: bool) -> 
         if call > 0 && seconds[call] <= best {
             last = report;
         }
+        motion = [x0, x1, filter.positions()];
     }
-    (seconds[1..].iter().copied().fold(f64::INFINITY, f64::min), last)
+    Measured { seconds: seconds[1..].iter().copied().fold(f64::INFINITY, f64::min), report: last, motion }
+}
+
+/// The last motion of a scene as OBJ files, and milliseconds of the best call.
+fn write(folder: &Path, scene: &Scene, measured: &Measured) {
+    std::fs::create_dir_all(folder).expect("a folder");
+    for (name, positions) in ["start", "wish", "end"].into_iter().zip(&measured.motion) {
+        let mut text = String::new();
+        for (v, [x, y, z]) in positions.iter().enumerate() {
+            if v == 0 || scene.groups[v] != scene.groups[v - 1] {
+                text.push_str(&format!("o part{}\n", scene.groups[v]));
+            }
+            text.push_str(&format!("v {x} {y} {z}\n"));
+        }
+        scene.triangles.iter().for_each(|t| text.push_str(&format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1)));
+        std::fs::write(folder.join(format!("{name}.obj")), text).expect("written");
+    }
+    std::fs::write(folder.join("milliseconds"), format!("{}\n", 1e3 * measured.seconds)).expect("written");
 }
 
 fn main() {
@@ -110,8 +139,16 @@ fn main() {
     );
     let number = |name: &str| words.iter().find_map(|w| w.strip_prefix(name)?.parse::<f64>().ok());
     if let (Some(count), Some(share)) = (number("vertices="), number("share=")) {
-        let (seconds, report) = measure(&scene(count as usize, share), &settings, 40, has("recorded"));
+        let Measured { seconds, report, .. } = measure(&scene(count as usize, share), &settings, 40, has("recorded"));
         println!("{:.2} ms of the processor, {:?}", 1e3 * seconds, report);
+        return;
+    }
+    if let Some(out) = words.iter().find_map(|w| w.strip_prefix("write=")) {
+        for share in [0.01, 0.05, 0.2] {
+            let scene = scene(10_000, share);
+            let folder = format!("{:.0} % colliding", 100.0 * share);
+            write(&Path::new(out).join(folder), &scene, &measure(&scene, &settings, 10, has("recorded")));
+        }
         return;
     }
     let counts = if has("quick") { &[1_000, 10_000][..] } else { &[1_000, 3_000, 10_000, 30_000, 100_000, 300_000] };
@@ -120,7 +157,8 @@ fn main() {
         let mut line = (0, 0.0);
         for count in counts {
             let scene = scene(*count, share);
-            let (seconds, r) = measure(&scene, &settings, if *count > 50_000 { 4 } else { 10 }, has("recorded"));
+            let calls = if *count > 50_000 { 4 } else { 10 };
+            let Measured { seconds, report: r, .. } = measure(&scene, &settings, calls, has("recorded"));
             let ms = |microseconds: f64| 1e-3 * microseconds;
             println!(
                 "{},{share},{:.2},{},{},{},{},{},{},{:.1},{:.1},{:.1},{:.1},{:.1}",

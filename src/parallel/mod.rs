@@ -153,7 +153,7 @@ impl Par<'_> {
     /// Without a pool nothing is gathered.
     pub fn fold_tasks<T: Send, R: Send>(
         &self,
-        mut tasks: impl ExactSizeIterator<Item = T>,
+        tasks: impl ExactSizeIterator<Item = T>,
         f: impl Fn(T) -> R + Sync,
         mut take: impl FnMut(R),
     ) {

@@ -24,6 +24,8 @@ struct Counting;
 thread_local! {
     /// Calls of this thread: tests run side by side.
     static CALLS: Cell<u64> = const { Cell::new(0) };
+    /// Bytes that this thread took and did not give back, and the most that there were.
+    static HELD: Cell<[i64; 2]> = const { Cell::new([0; 2]) };
 }
 
 fn count() {
@@ -31,21 +33,31 @@ fn count() {
     let _ = CALLS.try_with(|calls| calls.set(calls.get() + 1));
 }
 
+fn hold(bytes: i64) {
+    let _ = HELD.try_with(|held| {
+        let [now, most] = held.get();
+        held.set([now + bytes, most.max(now + bytes)]);
+    });
+}
+
 // SAFETY: everything is left to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
+        hold(layout.size() as i64);
         // SAFETY: as the caller promises.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        hold(-(layout.size() as i64));
         // SAFETY: as the caller promises.
         unsafe { System.dealloc(at, layout) }
     }
 
     unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         count();
+        hold(size as i64 - layout.size() as i64);
         // SAFETY: as the caller promises.
         unsafe { System.realloc(at, layout, size) }
     }
@@ -154,26 +166,34 @@ fn dynamics_and_metric_of_a_steady_step_allocate_nothing() {
     assert!(allocations(|| drop(std::hint::black_box(vec![0_u8; 100]))) > 0, "the allocator counts");
 }
 
+/// A sheet that the library drives, just above the ground, if there is one.
+fn sheet(n: u32, ground: bool) -> World {
+    let (positions, faces) = grid(n);
+    let mut world = World::new();
+    world
+        .add_sheet(SheetDescription {
+            options: BodyOptions { half_thickness: Some(1e-3), ..BodyOptions::default() },
+            positions,
+            rest: Vec::new(),
+            topology: Topology { triangles: faces, ..Topology::default() },
+            material: sheet_material(),
+            model: SheetModel::Shell,
+            forces: NodeForces::default(),
+        })
+        .unwrap();
+    if ground {
+        world.add_half_space(BodyOptions::default(), HalfSpace { normal: [0.0, 0.0, 1.0], offset: 0.0 }).unwrap();
+    }
+    world.set_gravity([0.0, 0.0, -9.81]).unwrap();
+    world
+}
+
 /// The whole step of a cloth at rest on the ground. Buffers of search, rows and contact solve are still made anew in
 /// each step: a list at a time, whatever the number of vertices, contacts and iterations.
 #[test]
 fn a_resting_step_allocates_a_bounded_number_of_times() {
     let steady = [8, 24].map(|n| {
-        let (positions, faces) = grid(n);
-        let mut world = World::new();
-        world
-            .add_sheet(SheetDescription {
-                options: BodyOptions { half_thickness: Some(1e-3), ..BodyOptions::default() },
-                positions,
-                rest: Vec::new(),
-                topology: Topology { triangles: faces, ..Topology::default() },
-                material: sheet_material(),
-                model: SheetModel::Shell,
-                forces: NodeForces::default(),
-            })
-            .unwrap();
-        world.add_half_space(BodyOptions::default(), HalfSpace { normal: [0.0, 0.0, 1.0], offset: 0.0 }).unwrap();
-        world.set_gravity([0.0, 0.0, -9.81]).unwrap();
+        let mut world = sheet(n, true);
         let mut step = || {
             let report = world.step(&Settings::default(), 0.004, Par::Serial).unwrap();
             assert!(!report.not_converged, "{report:?}");
@@ -196,3 +216,40 @@ fn a_resting_step_allocates_a_bounded_number_of_times() {
 
 /// Calls of the allocator that a resting step may make.
 const RESTING: u64 = 150;
+
+/// Bytes per vertex of a world, its most within steps, and what contacts add to that.
+#[test]
+fn memory_grows_with_vertices_and_contacts_and_is_bounded_by_them() {
+    let of = |n: u32, ground: bool| {
+        let before = HELD.get()[0];
+        let mut world = sheet(n, ground);
+        let mut contacts = 0;
+        for step in 0..60 {
+            if step == 30 {
+                HELD.set([HELD.get()[0]; 2]);
+            }
+            contacts = world.step(&Settings::default(), 0.004, Par::Serial).unwrap().contacts;
+        }
+        let [now, most] = HELD.get().map(|bytes| (bytes - before) as f64);
+        drop(world);
+        assert_eq!(HELD.get()[0], before, "a world that is dropped gives everything back");
+        (now, most, f64::from(contacts))
+    };
+    for n in [16, 48] {
+        let vertices = f64::from((n + 1) * (n + 1));
+        let ((falling, most_falling, none), (resting, most_resting, contacts)) = (of(n, false), of(n, true));
+        assert!(none == 0.0 && contacts >= 0.9 * vertices, "{none} {contacts}");
+        let [held, step] = [falling, most_falling - falling].map(|bytes| bytes / vertices);
+        let [kept, solved] = [resting - falling, most_resting - most_falling].map(|bytes| bytes / contacts);
+        println!(
+            "{vertices} vertices: {held:.0} bytes a vertex held, {step:.0} more within a step; a contact {kept:.0} held, \
+             {solved:.0} at the most"
+        );
+        assert!(held <= HELD_PER_VERTEX && held + step <= MOST_PER_VERTEX && solved <= MOST_PER_CONTACT);
+    }
+}
+
+/// Bytes for a vertex of a MODEL sheet between steps, and at most within one; bytes for a contact at most within one.
+const HELD_PER_VERTEX: f64 = 8e3;
+const MOST_PER_VERTEX: f64 = 9e3;
+const MOST_PER_CONTACT: f64 = 3e3;
