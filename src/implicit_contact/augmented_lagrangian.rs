@@ -19,6 +19,11 @@ use crate::parallel::BLOCK;
 const STIFFNESS: f64 = 3.0;
 /// The same where Newton systems are factored, which stiffness does not disturb.
 const STIFFNESS_FACTORED: f64 = 1e4;
+/// A row whose residual is not brought below this share by an update is given so many times the stiffness.
+const SLOW: f64 = 0.25;
+const STIFFER: f64 = 5.0;
+/// Rows that open faster than this share of the velocity scale are left out until they are violated.
+const NEAR: f64 = 0.02;
 /// Newton steps between two updates of the multipliers at most.
 const NEWTON_STEPS: u32 = 3;
 /// The same where they are factored.
@@ -106,6 +111,8 @@ struct Lagrangian<'a, 'b> {
     /// Normal velocity of each contact at the current `dv` `[m/s]`, and its change along the step.
     normals: Vec<f64>,
     normal_steps: Vec<f64>,
+    /// Normal residual of each contact at the last update of the multipliers `[m/s]`.
+    missed: Vec<f64>,
     /// Contacts that act at the current `dv`.
     system: NewtonSystem,
     gradient: Vec<Vec3>,
@@ -130,6 +137,60 @@ pub(super) fn run(
     buffers: &mut MeasureBuffers,
     work: &mut Work,
 ) -> Run {
+    if direct.is_some() {
+        return run_all(task, direct, at, iterations_max, patience, buffers, work);
+    }
+    let mut taken = vec![false; at.p.len()];
+    let mut last: Option<Run> = None;
+    loop {
+        let iterations = last.map_or(0, |run| run.iterations);
+        // The solution of the rows taken may violate others: then with those too, from there.
+        let share = if last.is_none() { NEAR } else { -task.settings.contact_tolerance };
+        let opens_slower = opening_slower_than(task, &at.dv, share * task.velocity_scale);
+        work.contacts += at.p.len() as u64;
+        let before = taken.iter().filter(|taken| **taken).count();
+        for (c, taken) in taken.iter_mut().enumerate() {
+            *taken |= at.p[c] != [0.0; 3] || opens_slower[c];
+        }
+        let list: Vec<usize> = (0..taken.len()).filter(|c| taken[*c]).collect();
+        match last {
+            Some(run) if list.len() == before => return run,
+            _ => {}
+        }
+        let packed = task.packed.subset(task.problem, &list);
+        let part = Task { packed: &packed, ..*task };
+        let mut near = Iterate { dv: std::mem::take(&mut at.dv), p: list.iter().map(|c| at.p[*c]).collect() };
+        let run = run_all(&part, None, &mut near, iterations_max - iterations, patience, buffers, work);
+        at.dv = near.dv;
+        for (c, p) in list.iter().zip(near.p) {
+            at.p[*c] = p;
+        }
+        let run = Run { iterations: iterations + run.iterations, ..run };
+        if run.ending != Ending::Converged || run.iterations >= iterations_max {
+            return run;
+        }
+        last = Some(run);
+    }
+}
+
+/// Whether each contact opens slower than `limit` `[m/s]` at `dv`.
+fn opening_slower_than(task: &Task, dv: &[Vec3], limit: f64) -> Vec<bool> {
+    task.par.map_indexed(task.packed.contacts.len(), |c| {
+        let contact = &task.packed.contacts[c];
+        dot(contact.frame[0], relative_velocity(contact, task.problem.rows, dv)) + contact.target[0] < limit
+    })
+}
+
+/// The same with all contacts of the task.
+fn run_all(
+    task: &Task,
+    direct: Option<DirectNewton>,
+    at: &mut Iterate,
+    iterations_max: u32,
+    patience: u32,
+    buffers: &mut MeasureBuffers,
+    work: &mut Work,
+) -> Run {
     let zeros = || vec![[0.0; 3]; at.dv.len()];
     let contacts = at.p.len();
     let relative = if direct.is_some() { STIFFNESS_FACTORED } else { STIFFNESS };
@@ -140,6 +201,7 @@ pub(super) fn run(
         }),
         normals: vec![0.0; contacts],
         normal_steps: vec![0.0; contacts],
+        missed: vec![f64::INFINITY; contacts],
         system: NewtonSystem::default(),
         gradient: zeros(),
         step: zeros(),
@@ -208,6 +270,9 @@ impl Lagrangian<'_, '_> {
                 }
                 continue;
             }
+            if !factored {
+                self.stiffen(&now.p);
+            }
             damping.observe(residuals.merit());
             if factored && self.gradient_velocity() > settled {
                 break;
@@ -227,6 +292,21 @@ impl Lagrangian<'_, '_> {
         match polish {
             Some(polish) => Run { iterations, ending: Ending::Converged, error: Some(polish.error) },
             None => Run { iterations, ending: Ending::Exhausted, error: None },
+        }
+    }
+
+    /// Stiffens the penalties of rows that the last update brought too little: rows that nearly depend on each other meet
+    /// little compliance in their difference, of which an update takes away a small share.
+    fn stiffen(&mut self, p: &[Vec3]) {
+        let enough = self.task.settings.contact_tolerance * self.task.velocity_scale;
+        for acting in &self.system.acting {
+            let c = acting.contact as usize;
+            let stiffness = &mut self.penalties[c].stiffness[0];
+            let missed = self.normals[c].min(p[c][0] / *stiffness).abs();
+            let before = std::mem::replace(&mut self.missed[c], missed);
+            if missed > enough && missed > SLOW * before {
+                *stiffness *= STIFFER;
+            }
         }
     }
 

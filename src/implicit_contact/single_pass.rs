@@ -13,6 +13,7 @@ use crate::linalg::power_of_two;
 use crate::math::simd::{Kernel, Quad, run_wide};
 use crate::math::{Mat3, Vec3};
 use crate::model::FrictionCone;
+use std::ops::Range;
 
 /// No record, or no general entries.
 pub(super) const NONE: u32 = u32::MAX;
@@ -375,22 +376,23 @@ impl GeneralRows {
         self.ends.len() as u32 - 1
     }
 
+    /// Places of the linear and of the angular entries of `row`.
     #[inline(always)]
-    fn entries(&self, row: u32) -> (&[(u32, f32)], &[(u32, Quad)]) {
+    fn entries(&self, row: u32) -> [Range<usize>; 2] {
         let row = row as usize;
-        let ([l0, a0], [l1, a1]) = (if row == 0 { [0, 0] } else { self.ends[row - 1] }, self.ends[row]);
-        (&self.linear[l0 as usize..l1 as usize], &self.angular[a0 as usize..a1 as usize])
+        let (first, last) = (if row == 0 { [0, 0] } else { self.ends[row - 1] }, self.ends[row]);
+        [first[0] as usize..last[0] as usize, first[1] as usize..last[1] as usize]
     }
 
     /// `W v`
     #[inline(always)]
     pub fn seen(&self, row: u32, u: &[Quad]) -> Quad {
-        let (linear, angular) = self.entries(row);
+        let [linear, angular] = self.entries(row);
         let mut sum = Quad::default();
-        for (b, w) in linear {
+        for (b, w) in &self.linear[linear] {
             sum = sum.add_scaled(*w, u[*b as usize]);
         }
-        for (b, lever) in angular {
+        for (b, lever) in &self.angular[angular] {
             sum = sum + u[*b as usize].cross(*lever);
         }
         sum
@@ -398,12 +400,12 @@ impl GeneralRows {
 
     #[inline(always)]
     fn respond(&self, row: u32, inverse: &[[Quad; 3]], f: Quad, u: &mut [Quad]) {
-        let (linear, angular) = self.entries(row);
-        for (b, w) in linear {
+        let [linear, angular] = self.entries(row);
+        for (b, w) in &self.linear[linear] {
             let b = *b as usize;
             u[b] = u[b].add_scaled(*w, Quad::combine(&inverse[b], f));
         }
-        for (b, lever) in angular {
+        for (b, lever) in &self.angular[angular] {
             let b = *b as usize;
             u[b] = u[b] + Quad::combine(&inverse[b], lever.cross(f));
         }

@@ -4,7 +4,7 @@ use crate::support::conjugate_gradient;
 use crate::support::problem::{Problem, contact_velocities, scattered};
 use signorini::implicit_contact::{SolverReport, SolverScratch, solve};
 use signorini::math::{Vec3, norm, sub};
-use signorini::model::Settings;
+use signorini::model::{Settings, SolverChoice};
 use signorini::parallel::Par;
 
 const NAMES: [&str; 5] = ["drape_75", "crumple_70", "crumple_105", "boxes", "sandwich"];
@@ -107,4 +107,14 @@ fn a_spoiled_solution_fails_the_conditions() {
     assert!(violations(&problem, &s)[5] > 1e-3);
     s.dv.iter_mut().for_each(|v| *v = [0.0; 3]);
     assert!(violations(&problem, &s)[0] > 1e-3);
+}
+
+/// Layers that hand a load on press through rows that nearly depend on each other: penalties stiffen where updates bring
+/// little, without which this takes 200 iterations.
+#[test]
+fn pressed_layers_take_few_updates() {
+    let solver = SolverChoice::AugmentedLagrangian;
+    let settings = Settings { solver, iterations_max: 140, ..Settings::default() };
+    let report = solved(&load("sandwich"), &settings, false).report;
+    assert!(report.converged, "{report:?}");
 }
