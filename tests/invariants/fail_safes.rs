@@ -1,5 +1,6 @@
 //! Fail-safes alone: with one round and no division, rigid zones keep momentum, hold takes it, and every end is clean.
 
+use crate::support::shapes::Triangles;
 use crate::world::*;
 use signorini::constraint::Metric;
 use signorini::contact_search::{BodyFilter, CandidateSearch, Passing, intersections};
@@ -318,4 +319,28 @@ fn holding_keeps_zones_that_came_clean() {
         }
     }
     assert!(cases > 0, "nothing was held");
+}
+
+#[test]
+fn a_rigid_zone_that_spins_fast_turns_by_a_radian_at_most() {
+    // A vertex falls on the middle of a triangle that turns by 2.5 radians in the step: chords of that turn would bring the
+    // two within a third of their distance.
+    let mut plan = Plan::rubbing(0.0);
+    let corners = vec![[0.1, 0.0, 0.0], [-0.05, 0.08, 0.0], [-0.05, -0.08, 0.0]];
+    let triangle = Triangles { positions: corners.clone(), faces: vec![[0, 1, 2]] };
+    let first = plan.cloth(&triangle, corners.clone(), 0.3, &[], [0.0; 3]);
+    let point = Triangles { positions: vec![[0.0; 3]], faces: Vec::new() };
+    let second = plan.cloth(&point, vec![[0.0, 0.0, 0.004]], 0.1, &[], [0.0; 3]);
+    let mut world = plan.build();
+    let turn = 2.5 / world.dt;
+    for (block, x) in world.body(first).blocks.clone().zip(&corners) {
+        world.velocities[block] = [0.0, 0.0, turn * x[1]];
+    }
+    let block = world.body(second).blocks.start;
+    world.velocities[block] = [0.0, 0.0, -0.02 / world.dt];
+    world.prepare();
+    let outcome = zones_of(&world, FailSafe::RigidZone, ZoneFriction::Frictionless);
+    assert!(outcome.hits.is_empty() && outcome.reports.len() == 1, "{:?}", outcome.reports);
+    // What the shorter turn leaves out is told.
+    assert!(norm(outcome.reports[0].angular_momentum_change) > 1e-3, "{:?}", outcome.reports);
 }

@@ -227,7 +227,7 @@ fn conflicting_scripts_pinch_with_witnesses_and_open_again() {
     for seed in 0..3 {
         let (mut world, upper, lower) = jaws(seed);
         let gap = |world: &World| world.pose(upper).position[2] - world.pose(lower).position[2] - 0.1;
-        let mut pinched = 0;
+        let (mut pinched, mut farthest) = (0, 0.0_f64);
         for step in 0..8 {
             let before = gap(&world);
             close(&mut world, upper, lower, 0.004);
@@ -237,12 +237,18 @@ fn conflicting_scripts_pinch_with_witnesses_and_open_again() {
                     pinched += 1;
                     assert!(!witnesses.is_empty());
                     let f = report.certified_fraction;
+                    farthest = farthest.max(f);
                     assert!((gap(&world) - (before - 0.008 * f)).abs() < 1e-12, "seed {seed} step {step}");
                 }
                 Err(other) => panic!("seed {seed} step {step}: {other:?}"),
             }
+            // A pinched state is not what the step has certified at its end.
+            let filter = BodyFilter::new(&world.model);
+            let found = intersections(&world.model, &filter, &world.state, Par::Serial);
+            assert!(found.witnesses.is_empty(), "seed {seed} step {step}: {:?}", found.witnesses);
         }
         assert!(pinched > 0 && gap(&world) > 0.0);
+        assert!(farthest > 0.1, "seed {seed}: the scripts go on as far as there is room: {farthest}");
         for step in 0..4 {
             close(&mut world, upper, lower, -0.004);
             let report = world.advance(Par::Serial).unwrap_or_else(|e| panic!("seed {seed} opening {step}: {e:?}"));
