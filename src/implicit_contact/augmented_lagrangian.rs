@@ -19,7 +19,8 @@ use crate::parallel::BLOCK;
 const STIFFNESS: f64 = 3.0;
 /// The same where Newton systems are factored, which stiffness does not disturb.
 const STIFFNESS_FACTORED: f64 = 1e4;
-/// A row whose residual is not brought below this share by an update is given so many times the stiffness.
+/// A row whose residual is not brought below this share by an update is given so many times the stiffness, once: where
+/// rows conflict, more would be too stiff for conjugate gradients.
 const SLOW: f64 = 0.25;
 const STIFFER: f64 = 5.0;
 /// Rows that open faster than this share of the velocity scale are left out until they are violated.
@@ -55,6 +56,24 @@ struct Penalty {
     stiffness: [f64; 2],
     /// Friction limit, frozen.
     bound: f64,
+}
+
+/// What a run may do.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Turn {
+    /// Iterations at most.
+    pub iterations_max: u32,
+    /// Iterations that need not halve the residuals.
+    pub patience: u32,
+    /// Whether penalties stiffen where updates bring little.
+    pub stiffens: bool,
+}
+
+impl Turn {
+    /// As many iterations, without patience ever running out.
+    pub fn of(iterations_max: u32) -> Turn {
+        Turn { iterations_max, patience: u32::MAX, stiffens: true }
+    }
 }
 
 /// How far friction limits follow the normal multipliers at an update. Where friction decides how hard contacts press, all
@@ -113,6 +132,8 @@ struct Lagrangian<'a, 'b> {
     normal_steps: Vec<f64>,
     /// Normal residual of each contact at the last update of the multipliers `[m/s]`.
     missed: Vec<f64>,
+    /// Whether its penalty was stiffened, or is not to be.
+    stiffened: Vec<bool>,
     /// Contacts that act at the current `dv`.
     system: NewtonSystem,
     gradient: Vec<Vec3>,
@@ -125,20 +146,18 @@ struct Lagrangian<'a, 'b> {
     work: Work,
 }
 
-/// Runs from `at` until the tolerances are met, `iterations_max`, or `patience` iterations did not halve the residuals;
-/// leaves the best iterate. Iterations count the steps of the linear solves, which cost about as much as an iteration of
+/// Runs from `at` until the tolerances are met or the turn is over; leaves the best iterate. Iterations count the steps of the linear solves, which cost about as much as an iteration of
 /// the other solvers.
 pub(super) fn run(
     task: &Task,
     direct: Option<DirectNewton>,
     at: &mut Iterate,
-    iterations_max: u32,
-    patience: u32,
+    turn: Turn,
     buffers: &mut MeasureBuffers,
     work: &mut Work,
 ) -> Run {
     if direct.is_some() {
-        return run_all(task, direct, at, iterations_max, patience, buffers, work);
+        return run_all(task, direct, at, turn, buffers, work);
     }
     let mut taken = vec![false; at.p.len()];
     let mut last: Option<Run> = None;
@@ -160,13 +179,14 @@ pub(super) fn run(
         let packed = task.packed.subset(task.problem, &list);
         let part = Task { packed: &packed, ..*task };
         let mut near = Iterate { dv: std::mem::take(&mut at.dv), p: list.iter().map(|c| at.p[*c]).collect() };
-        let run = run_all(&part, None, &mut near, iterations_max - iterations, patience, buffers, work);
+        let left = Turn { iterations_max: turn.iterations_max - iterations, ..turn };
+        let run = run_all(&part, None, &mut near, left, buffers, work);
         at.dv = near.dv;
         for (c, p) in list.iter().zip(near.p) {
             at.p[*c] = p;
         }
         let run = Run { iterations: iterations + run.iterations, ..run };
-        if run.ending != Ending::Converged || run.iterations >= iterations_max {
+        if run.ending != Ending::Converged || run.iterations >= turn.iterations_max {
             return run;
         }
         last = Some(run);
@@ -186,8 +206,7 @@ fn run_all(
     task: &Task,
     direct: Option<DirectNewton>,
     at: &mut Iterate,
-    iterations_max: u32,
-    patience: u32,
+    turn: Turn,
     buffers: &mut MeasureBuffers,
     work: &mut Work,
 ) -> Run {
@@ -202,6 +221,7 @@ fn run_all(
         normals: vec![0.0; contacts],
         normal_steps: vec![0.0; contacts],
         missed: vec![f64::INFINITY; contacts],
+        stiffened: vec![!turn.stiffens; contacts],
         system: NewtonSystem::default(),
         gradient: zeros(),
         step: zeros(),
@@ -210,7 +230,7 @@ fn run_all(
         direct,
         work: Work::default(),
     };
-    let run = l.iterate(at, iterations_max, Stagnation::new(patience), buffers);
+    let run = l.iterate(at, turn.iterations_max, Stagnation::new(turn.patience), buffers);
     // Bounds were frozen: what is left of that, within the tolerances, goes.
     for (p, contact) in at.p.iter_mut().zip(&task.packed.contacts) {
         *p = project(task.settings.friction_cone, contact.friction, *p);
@@ -304,7 +324,8 @@ impl Lagrangian<'_, '_> {
             let stiffness = &mut self.penalties[c].stiffness[0];
             let missed = self.normals[c].min(p[c][0] / *stiffness).abs();
             let before = std::mem::replace(&mut self.missed[c], missed);
-            if missed > enough && missed > SLOW * before {
+            if missed > enough && missed > SLOW * before && !self.stiffened[c] {
+                self.stiffened[c] = true;
                 *stiffness *= STIFFER;
             }
         }

@@ -1,6 +1,7 @@
 //! The frictional contact problem [Otaduy09, Eq. 7] over one metric, and the one signature of its solvers.
 
 use super::accelerated_relaxation::{Control, Passes};
+use super::augmented_lagrangian::Turn;
 use super::block_diagonal::Best;
 use super::direct_newton::DirectNewton;
 use super::friction::project;
@@ -155,7 +156,7 @@ fn choose(
             run
         }
         SolverChoice::AugmentedLagrangian => {
-            augmented_lagrangian::run(task, DirectNewton::new(task.problem), at, max, u32::MAX, buffers, work)
+            augmented_lagrangian::run(task, DirectNewton::new(task.problem), at, Turn::of(max), buffers, work)
         }
         SolverChoice::FullAnticipation => full_anticipation::run(task, at, max, buffers, work),
         SolverChoice::AcceleratedRelaxation => {
@@ -196,8 +197,10 @@ fn automatic(
             return Run { iterations, ..run };
         }
         report.hand_overs += 1;
-        let (direct, left) = (DirectNewton::new(task.problem), turn.min(max - iterations));
-        let run = augmented_lagrangian::run(task, direct, at, left, TURN_PATIENCE, buffers, work);
+        // What stiffer penalties did not solve is tried without.
+        let stiffens = control.passes == Passes::One;
+        let this = Turn { iterations_max: turn.min(max - iterations), patience: TURN_PATIENCE, stiffens };
+        let run = augmented_lagrangian::run(task, DirectNewton::new(task.problem), at, this, buffers, work);
         iterations += run.iterations;
         if run.ending == Ending::Converged || iterations >= max {
             return Run { iterations, ..run };
@@ -226,7 +229,7 @@ fn automatic_uncoupled(
     let mut best = Best::new(task, at, work);
     if let Some(direct) = DirectNewton::new(task.problem).filter(small) {
         let left = (2 * UNCOUPLED_TURN).min(max / 2);
-        let run = augmented_lagrangian::run(task, Some(direct), at, left, u32::MAX, buffers, work);
+        let run = augmented_lagrangian::run(task, Some(direct), at, Turn::of(left), buffers, work);
         iterations += run.iterations;
         // Velocities follow from the impulses here, and with those the contacts must hold.
         if (best.take(task, at, work) && run.ending == Ending::Converged) || iterations >= max {
@@ -247,7 +250,7 @@ fn automatic_uncoupled(
         }
         report.hand_overs += 1;
         let (direct, left) = (DirectNewton::new(task.problem), (2 * turn).min(max - iterations));
-        let run = augmented_lagrangian::run(task, direct, at, left, u32::MAX, buffers, work);
+        let run = augmented_lagrangian::run(task, direct, at, Turn::of(left), buffers, work);
         iterations += run.iterations;
         // Converged or not: with the velocities that follow from the impulses the passes have the last word.
         best.take(task, at, work);
