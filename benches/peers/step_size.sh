@@ -6,11 +6,6 @@ out=${1:?usage: benches/peers/step_size.sh OUT}
 mkdir -p "$out"
 out=$(realpath -- "$out")
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../.."
-python=${PEERS_PYTHON:-out/peers-venv/bin/python}
-if ! [ -x "$python" ]; then
-  ci/setup python3-venv
-  python3 -m venv out/peers-venv
-  out/peers-venv/bin/pip install --quiet ipctk==1.6.1 numpy==2.4.6
-fi
+. benches/peers/python.sh
 cargo bench --quiet --bench filter -- "write=$out"
 "$python" benches/peers/step_size.py "$out"

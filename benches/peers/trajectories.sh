@@ -10,12 +10,7 @@ seconds=${SECONDS_EACH:-300}
 mkdir -p "$out"
 out=$(realpath -- "$out")
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../.."
-python=${PEERS_PYTHON:-out/peers-venv/bin/python}
-if ! [ -x "$python" ]; then
-  ci/setup python3-venv python3-dev libsuitesparse-dev libbullet-dev pkg-config g++
-  python3 -m venv out/peers-venv
-  out/peers-venv/bin/pip install --quiet -r benches/peers/cloth/requirements.txt
-fi
+. benches/peers/python.sh
 cargo build --release --quiet --example clean_trajectory --example certify
 g++ -O2 benches/peers/cloth/bullet_cloth.cpp -o "$out/bullet_cloth" $(pkg-config --cflags --libs bullet-float64)
 

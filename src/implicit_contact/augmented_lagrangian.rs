@@ -146,8 +146,9 @@ struct Lagrangian<'a, 'b> {
     work: Work,
 }
 
-/// Runs from `at` until the tolerances are met or the turn is over; leaves the best iterate. Iterations count the steps of the linear solves, which cost about as much as an iteration of
-/// the other solvers.
+/// Runs from `at` until the tolerances are met or the turn is over; leaves the best iterate. Iterations count the steps of
+/// the linear solves, which cost about as much as an iteration of the other solvers. Rows that open fast are left out
+/// until a solution violates them, and a run has converged only once it violates none.
 pub(super) fn run(
     task: &Task,
     direct: Option<DirectNewton>,
@@ -172,9 +173,13 @@ pub(super) fn run(
             *taken |= at.p[c] != [0.0; 3] || opens_slower[c];
         }
         let list: Vec<usize> = (0..taken.len()).filter(|c| taken[*c]).collect();
-        match last {
-            Some(run) if list.len() == before => return run,
-            _ => {}
+        if let Some(run) = last {
+            if list.len() == before {
+                return run;
+            }
+            if iterations >= turn.iterations_max {
+                return Run { ending: Ending::Exhausted, error: None, ..run };
+            }
         }
         let packed = task.packed.subset(task.problem, &list);
         let part = Task { packed: &packed, ..*task };
@@ -186,7 +191,7 @@ pub(super) fn run(
             at.p[*c] = p;
         }
         let run = Run { iterations: iterations + run.iterations, ..run };
-        if run.ending != Ending::Converged || run.iterations >= turn.iterations_max {
+        if run.ending != Ending::Converged {
             return run;
         }
         last = Some(run);

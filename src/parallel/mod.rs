@@ -196,6 +196,7 @@ mod tests {
             assert!(squares.iter().enumerate().all(|(i, s)| *s == i * i));
         }
     }
+
     #[test]
     fn folds_keep_the_order_of_their_tasks_on_any_number_of_threads() {
         let order = |par: Par| {
