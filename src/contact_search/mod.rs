@@ -4,13 +4,14 @@
 //! * `pair`: primitive pairs of a model, which may touch, thickness, persistent keys
 //! * `contact`: the contact record with its gap
 //! * `candidates`: broad phase over a segment, kept while it holds, and at one state for the certificate
-//! * `near`: contacts near the start
+//! * `near`, `distinct`: contacts near the start, each once
 //! * `swept`: continuous detection over a segment
 //! * `passing`: tangled vertices, whose pairs pass
 //! * `intersecting`: exact intersections of a state, with witnesses
 
 mod candidates;
 mod contact;
+mod distinct;
 mod intersecting;
 mod near;
 mod pair;

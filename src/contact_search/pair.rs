@@ -156,7 +156,10 @@ impl Pair {
         if a != b {
             return Some(full);
         }
-        let rest = self.vertices(model).map(|v| model.rest[v as usize]);
+        let rest = gather(self.vertices(model), &model.rest);
+        if self.apart_along_an_axis(&rest, full) {
+            return Some(full);
+        }
         let distance = self.closest_points(&rest).distance_squared.sqrt();
         if distance == 0.0 {
             None
@@ -165,6 +168,24 @@ impl Pair {
         } else {
             Some(full)
         }
+    }
+}
+
+impl Pair {
+    /// Whether the boxes of the two primitives prove a distance, with a margin beyond the rounding of
+    /// [`Pair::closest_points`].
+    #[inline]
+    fn apart_along_an_axis(&self, x: &[Vec3; 4], distance: f64) -> bool {
+        let first = if self.kind == PairKind::EdgeEdge { x[1] } else { x[0] };
+        let second = if self.kind == PairKind::EdgeEdge { x[3] } else { x[1] };
+        (0..3).any(|c| {
+            let (a, b, p, q) = (x[0][c], first[c], x[2][c], x[3][c]);
+            let (low_a, high_a) = (a.min(b), a.max(b));
+            let (low_b, high_b) = (p.min(q).min(second[c]), p.max(q).max(second[c]));
+            let gap = (low_b - high_a).max(low_a - high_b);
+            let extent = high_a.max(high_b) - low_a.min(low_b);
+            gap - distance > 64.0 * f64::EPSILON * (extent + distance)
+        })
     }
 }
 

@@ -4,7 +4,7 @@
 //! * `brute_force`: every pair tested; the oracle of the other structures
 //! * `ownership`, `bvh`, `leaf_blocks`, `leaf_pairs`, `pair_lists`, `broad_phase`: the same candidates by a tree of boxes
 //! * `proximity`: near pairs at a state, with weights, normals and distances
-//! * `screening`: candidates that a separating direction rules out, several at once
+//! * `screening`, `directions`: candidates that a separating direction rules out, several at once
 //! * `intersection`: the certificate, edges against faces by exact predicates
 //! * `ccd`: continuous detection of one pair
 
@@ -12,6 +12,7 @@ mod broad_phase;
 pub mod brute_force;
 mod bvh;
 pub mod ccd;
+mod directions;
 pub mod intersection;
 mod leaf_blocks;
 mod leaf_pairs;

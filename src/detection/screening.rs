@@ -2,17 +2,24 @@
 //!
 //! Both primitives are convex: a direction n keeps them apart by s when `n·D_k >= s |n|` for every difference `D_k` of
 //! their vertices, and by s over a whole step when that holds at both ends, `n·D_k` being linear in time. The direction
-//! is the one between approximate closest points at the start; whatever it is, the test proves what it says.
+//! is the one between approximate closest points at the start; whatever it is, the test proves what it says. Single
+//! precision rules out most pairs, double precision what is too close for it.
 
 use super::ccd::{DIRECTION_ERROR, Shape};
+use super::directions::{differences, direction, sizes, support};
 use super::primitives::{Candidates, Primitives};
-use crate::math::Vec3;
-use crate::math::simd::points::{Point, cross, dot, gather, if_positive, scale, sub};
-use crate::math::simd::{Kernel, Lanes, run_wide};
+use crate::geometry::Aabb;
+use crate::math::simd::points::{Point, dot, gather, gather_quads};
+use crate::math::simd::{Kernel, Lanes, Number, run_wide};
+use crate::math::{Vec3, scale, sub};
 use crate::parallel::Par;
+use std::ops::Range;
 
-/// Pairs side by side.
+/// Pairs side by side in double precision.
 const WIDTH: usize = 4;
+
+/// Pairs side by side in single precision.
+const COARSE_WIDTH: usize = 8;
 
 /// No candidate.
 const NONE: u32 = u32::MAX;
@@ -20,12 +27,36 @@ const NONE: u32 = u32::MAX;
 /// Margin of rounding of distances from elsewhere, relative: what is ruled out here is ruled out there.
 const SLACK: f64 = 1e-9;
 
+/// The same in single precision; also how much a direction may be longer than one.
+const COARSE_SLACK: f32 = 1e-4;
+
+/// Rounding of `n·D` in single precision, for a difference of size one of points within the unit cube: of its
+/// coordinates (a half unit in the last place each), and of the product.
+const COARSE_ERROR: f32 = 8.0 * UNIT_ROUNDOFF;
+
+/// The same for each unit of the sizes of all differences together.
+const COARSE_DIRECTION_ERROR: f32 = 32.0 * UNIT_ROUNDOFF;
+
+/// Of single precision.
+const UNIT_ROUNDOFF: f32 = 0.5 * f32::EPSILON;
+
+/// Where single precision errs by more than this share of a reach, double precision looks at what it leaves.
+const COARSE_SHARE: f64 = 0.01;
+
 /// Numbers of the candidates that may be nearer at `x` than the reaches of their primitives together, vertex-face pairs
 /// first, ascending. `reach` is by vertex index and the same for all vertices of a primitive `[m]`.
 ///
 /// None that is nearer is left out, by exact distance or by that of [`crate::geometry`]. Cost: linear.
 pub fn near(x: &[Vec3], primitives: &Primitives, candidates: &Candidates, reach: &[f64], par: Par) -> Vec<u32> {
-    Screen { x0: x, x1: None, primitives, reach }.open(candidates, par)
+    let lists = Lists { primitives, candidates };
+    let mut open = lists.all();
+    let coarse = Coarse::new(x, None, reach, par);
+    lists.rule_out::<COARSE_WIDTH, _>(&coarse, &mut open, par);
+    let smallest = reach.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+    if f64::from(COARSE_ERROR) > COARSE_SHARE * smallest * coarse.per_metre {
+        lists.rule_out::<WIDTH, _>(&Fine { x0: x, x1: None, reach }, &mut open, par);
+    }
+    open
 }
 
 /// Numbers of the candidates that may come closer than half of `min(thickness, distance at x0)` on straight lines from
@@ -38,76 +69,197 @@ pub fn approaching(
     half_thickness: &[f64],
     par: Par,
 ) -> Vec<u32> {
-    Screen { x0, x1: Some(x1), primitives, reach: half_thickness }.open(candidates, par)
+    let lists = Lists { primitives, candidates };
+    let mut open = lists.all();
+    lists.rule_out::<COARSE_WIDTH, _>(&Coarse::new(x0, Some(x1), half_thickness, par), &mut open, par);
+    lists.rule_out::<WIDTH, _>(&Fine { x0, x1: Some(x1), reach: half_thickness }, &mut open, par);
+    open
 }
 
-/// The question, for all candidates.
+/// A test of `L` pairs side by side, given by the indices of their vertices.
+trait Screen<const L: usize>: Sync {
+    type Margin: Number;
+    /// Greater than zero where the pair is ruled out.
+    fn margin(&self, shape: Shape, v: &[[usize; 4]; L]) -> [Self::Margin; L];
+}
+
+/// The candidates by number, vertex-face pairs first.
 #[derive(Clone, Copy)]
-struct Screen<'a> {
-    x0: &'a [Vec3],
-    x1: Option<&'a [Vec3]>,
+struct Lists<'a> {
     primitives: &'a Primitives<'a>,
-    reach: &'a [f64],
+    candidates: &'a Candidates,
 }
 
-impl Screen<'_> {
-    fn open(self, candidates: &Candidates, par: Par) -> Vec<u32> {
-        let (vertex_face, edge_edge) = (&candidates.vertex_face, &candidates.edge_edge);
-        let mut numbers = vec![NONE; vertex_face.len() + edge_edge.len()];
-        let (first, second) = numbers.split_at_mut(vertex_face.len());
-        let lists =
-            [(first, vertex_face, Shape::VertexFace, 0), (second, edge_edge, Shape::EdgeEdge, vertex_face.len())];
-        for (out, pairs, shape, offset) in lists {
-            par.for_each_block(out, |start, out| {
-                let pairs = &pairs[start..start + out.len()];
-                run_wide(Block { screen: self, shape, pairs, offset: (offset + start) as u32, out });
-            });
-        }
+impl Lists<'_> {
+    fn all(&self) -> Vec<u32> {
+        (0..(self.candidates.vertex_face.len() + self.candidates.edge_edge.len()) as u32).collect()
+    }
+
+    /// Leaves those of the ascending numbers that the screen does not rule out.
+    fn rule_out<const L: usize, S: Screen<L>>(&self, screen: &S, numbers: &mut Vec<u32>, par: Par) {
+        par.for_each_block(numbers, |_, numbers| run_wide(Block::<L, S> { lists: *self, screen, numbers }));
         numbers.retain(|n| *n != NONE);
-        numbers
     }
 
     #[inline(always)]
-    fn vertices(&self, shape: Shape, [a, b]: [u32; 2]) -> [usize; 4] {
+    fn vertices(&self, shape: Shape, number: u32) -> [usize; 4] {
+        let number = number as usize;
         let v = match shape {
             Shape::VertexFace => {
+                let [a, b] = self.candidates.vertex_face[number];
                 let [t0, t1, t2] = self.primitives.faces[b as usize];
                 [a, t0, t1, t2]
             }
             Shape::EdgeEdge => {
+                let [a, b] = self.candidates.edge_edge[number - self.candidates.vertex_face.len()];
                 let ([a0, a1], [b0, b1]) = (self.primitives.edges[a as usize], self.primitives.edges[b as usize]);
                 [a0, a1, b0, b1]
             }
         };
-        v.map(|v| v as usize)
+        [v[0] as usize, v[1] as usize, v[2] as usize, v[3] as usize]
     }
+}
 
-    /// Greater than zero where the pair is ruled out.
+/// Some of the numbers; those of pairs left open go to the front, [`NONE`] behind them.
+struct Block<'a, const L: usize, S> {
+    lists: Lists<'a>,
+    screen: &'a S,
+    numbers: &'a mut [u32],
+}
+
+impl<const L: usize, S: Screen<L>> Kernel for Block<'_, L, S> {
+    type Output = ();
+
     #[inline(always)]
-    fn margin(&self, shape: Shape, pairs: &[[u32; 2]; WIDTH]) -> Lanes<WIDTH> {
-        let v = pairs.map(|pair| self.vertices(shape, pair));
-        let second = if shape == Shape::VertexFace { 1 } else { 2 };
+    fn run(mut self) {
+        let vertex_faces = self.lists.candidates.vertex_face.len();
+        let split = self.numbers.partition_point(|n| (*n as usize) < vertex_faces);
+        let filled = self.compact(Shape::VertexFace, 0..split, 0);
+        let filled = self.compact(Shape::EdgeEdge, split..self.numbers.len(), filled);
+        self.numbers[filled..].fill(NONE);
+    }
+}
+
+impl<const L: usize, S: Screen<L>> Block<'_, L, S> {
+    /// Moves what is left of a range to `filled` and behind; returns the end of it.
+    #[inline(always)]
+    fn compact(&mut self, shape: Shape, range: Range<usize>, mut filled: usize) -> usize {
+        let mut start = range.start;
+        while start < range.end {
+            let width = L.min(range.end - start);
+            // Lanes beyond the last pair repeat it.
+            let mut numbers = [self.numbers[start]; L];
+            let mut v = [[0; 4]; L];
+            for l in 0..L {
+                numbers[l] = self.numbers[start + l.min(width - 1)];
+                v[l] = self.lists.vertices(shape, numbers[l]);
+            }
+            let margin = self.screen.margin(shape, &v);
+            for l in 0..width {
+                // What is not a number stays open.
+                let apart = margin[l] > S::Margin::ZERO;
+                self.numbers[filled] = numbers[l];
+                filled += 1 - usize::from(apart);
+            }
+            start += width;
+        }
+        filled
+    }
+}
+
+/// In double precision, as the data are.
+struct Fine<'a> {
+    x0: &'a [Vec3],
+    x1: Option<&'a [Vec3]>,
+    reach: &'a [f64],
+}
+
+impl Screen<WIDTH> for Fine<'_> {
+    type Margin = f64;
+
+    #[inline(always)]
+    fn margin(&self, shape: Shape, v: &[[usize; 4]; WIDTH]) -> [f64; WIDTH] {
         let mut reach = Lanes([0.0; WIDTH]);
         for l in 0..WIDTH {
-            reach.0[l] = self.reach[v[l][0]] + self.reach[v[l][second]];
+            reach.0[l] = self.reach[v[l][0]] + self.reach[v[l][second(shape)]];
         }
-        let d0 = differences(shape, &gather(self.x0, &v));
+        let d0 = differences(shape, &gather(self.x0, v));
         let (n, distance) = direction(shape, &d0);
-        match self.x1 {
-            None => {
-                let error = sizes(&d0) * Lanes::splat(16.0 * DIRECTION_ERROR);
-                certain(support(&n, &d0), reach * Lanes::splat(1.0 + SLACK) + error, sizes(&d0))
-            }
-            Some(x1) => {
-                let d1 = differences(shape, &gather(x1, &v));
-                let extent = sizes(&d0) + sizes(&d1);
-                let rounding = Lanes::splat(2.0 * DIRECTION_ERROR) * extent;
-                let distance = distance * Lanes::splat(1.0 + SLACK) + rounding;
-                let separation = Lanes::splat(0.5) * reach.min(distance);
-                certain(support(&n, &d0).min(support(&n, &d1)), required(separation, extent), extent)
-            }
-        }
+        let Some(x1) = self.x1 else {
+            let error = sizes(&d0) * Lanes::splat(16.0 * DIRECTION_ERROR);
+            return certain(support(&n, &d0), reach * Lanes::splat(1.0 + SLACK) + error, sizes(&d0)).0;
+        };
+        let d1 = differences(shape, &gather(x1, v));
+        let extent = sizes(&d0) + sizes(&d1);
+        let distance = distance * Lanes::splat(1.0 + SLACK) + Lanes::splat(2.0 * DIRECTION_ERROR) * extent;
+        let separation = Lanes::splat(0.5) * reach.min(distance);
+        certain(support(&n, &d0).min(support(&n, &d1)), required(separation, extent), extent).0
     }
+}
+
+/// In single precision, moved and scaled to the unit cube: the fourth number is the reach.
+struct Coarse {
+    x0: Vec<[f32; 4]>,
+    x1: Vec<[f32; 4]>,
+    /// Lengths here for each metre there; zero, so that every pair stays open, where squares of these may leave the range
+    /// of doubles.
+    per_metre: f64,
+}
+
+impl Coarse {
+    fn new(x0: &[Vec3], x1: Option<&[Vec3]>, reach: &[f64], par: Par) -> Coarse {
+        let x1 = x1.unwrap_or(&[]);
+        let mut bounds = Aabb::EMPTY;
+        for x in x0.iter().chain(x1) {
+            bounds = bounds.union(&Aabb { low: *x, high: *x });
+        }
+        let (low, size) = (bounds.low, sub(bounds.high, bounds.low));
+        let largest = size[0].max(size[1]).max(size[2]);
+        let per_metre = if (1e-50..1e60).contains(&largest) { 1.0 / largest } else { 0.0 };
+        let packed = |x: &[Vec3]| -> Vec<[f32; 4]> {
+            par.map_indexed(x.len(), |v| {
+                let [a, b, c] = scale(per_metre, sub(x[v], low));
+                // Rounding is within the slack of the tests.
+                [a as f32, b as f32, c as f32, (per_metre * reach[v]) as f32]
+            })
+        };
+        Coarse { x0: packed(x0), x1: packed(x1), per_metre }
+    }
+}
+
+impl Screen<COARSE_WIDTH> for Coarse {
+    type Margin = f32;
+
+    #[inline(always)]
+    fn margin(&self, shape: Shape, v: &[[usize; 4]; COARSE_WIDTH]) -> [f32; COARSE_WIDTH] {
+        let (x0, reach) = gather_quads(&self.x0, v);
+        let reach = reach[0] + reach[second(shape)];
+        let d0 = differences(shape, &x0);
+        let (n, distance) = direction(shape, &d0);
+        let (mut gap, mut extent, mut separation) = (support(&n, &d0), sizes(&d0), reach);
+        if !self.x1.is_empty() {
+            let d1 = differences(shape, &gather_quads(&self.x1, v).0);
+            (gap, extent) = (gap.min(support(&n, &d1)), extent + sizes(&d1));
+            let distance = distance * Lanes::splat(1.0 + COARSE_SLACK) + Lanes::splat(2.0) * coarse_error(extent);
+            separation = Lanes::splat(0.5) * reach.min(distance);
+        }
+        let required = separation * Lanes::splat(1.0 + COARSE_SLACK) + coarse_error(extent);
+        let unit = Lanes::splat(1.0 + COARSE_SLACK) - dot(&n, &n);
+        // NaN last: the smaller of two is the second where one is not a number.
+        unit.min(gap - required).0
+    }
+}
+
+/// Bound on the rounding of `n·D`, and on half that of a distance.
+#[inline(always)]
+fn coarse_error<const L: usize>(extent: Lanes<L, f32>) -> Lanes<L, f32> {
+    Lanes::splat(COARSE_ERROR) + Lanes::splat(COARSE_DIRECTION_ERROR) * extent
+}
+
+/// The first vertex of the second primitive.
+#[inline(always)]
+fn second(shape: Shape) -> usize {
+    if shape == Shape::VertexFace { 1 } else { 2 }
 }
 
 /// Greater than zero where the direction between the closest points at one end of the step, `at_end` or the start,
@@ -139,126 +291,4 @@ fn certain<const L: usize>(gap: Lanes<L>, required: Lanes<L>, extent: Lanes<L>) 
     let in_range = (extent - Lanes::splat(1e-60)).min(Lanes::splat(1e60) - extent);
     // NaN last: the smaller of two is the second where one is not a number.
     in_range.min(Lanes::splat(4.0) * extent - gap).min(gap - required)
-}
-
-/// Candidates of one block; the numbers of those left open go to the front of `out`.
-struct Block<'a> {
-    screen: Screen<'a>,
-    shape: Shape,
-    pairs: &'a [[u32; 2]],
-    offset: u32,
-    out: &'a mut [u32],
-}
-
-impl Kernel for Block<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        match self.shape {
-            Shape::VertexFace => self.run_shape(Shape::VertexFace),
-            Shape::EdgeEdge => self.run_shape(Shape::EdgeEdge),
-        }
-    }
-}
-
-impl Block<'_> {
-    #[inline(always)]
-    fn run_shape(self, shape: Shape) {
-        let mut filled = 0;
-        for (group, chunk) in self.pairs.chunks(WIDTH).enumerate() {
-            // Lanes beyond the last pair repeat the first one.
-            let mut pairs = [chunk[0]; WIDTH];
-            pairs[..chunk.len()].copy_from_slice(chunk);
-            let margin = self.screen.margin(shape, &pairs);
-            for l in 0..chunk.len() {
-                let open = margin.0[l] > 0.0;
-                if !open {
-                    self.out[filled] = self.offset + (WIDTH * group + l) as u32;
-                    filled += 1;
-                }
-            }
-        }
-    }
-}
-
-/// The differences of a pair's vertices, from the second primitive to the first; of vertex-face pairs the last twice.
-#[inline(always)]
-fn differences<const L: usize>(shape: Shape, x: &[Point<L>; 4]) -> [Point<L>; 4] {
-    match shape {
-        Shape::VertexFace => {
-            let last = sub(&x[0], &x[3]);
-            [sub(&x[0], &x[1]), sub(&x[0], &x[2]), last, last]
-        }
-        Shape::EdgeEdge => [sub(&x[0], &x[2]), sub(&x[0], &x[3]), sub(&x[1], &x[2]), sub(&x[1], &x[3])],
-    }
-}
-
-/// Sum of all sizes: at least the largest, and not a number where one is none.
-#[inline(always)]
-fn sizes<const L: usize>(d: &[Point<L>; 4]) -> Lanes<L> {
-    let size = |v: &Point<L>| v[0].abs() + v[1].abs() + v[2].abs();
-    (size(&d[0]) + size(&d[1])) + (size(&d[2]) + size(&d[3]))
-}
-
-/// The smallest `n·D_k`.
-#[inline(always)]
-fn support<const L: usize>(n: &Point<L>, d: &[Point<L>; 4]) -> Lanes<L> {
-    dot(n, &d[0]).min(dot(n, &d[1])).min(dot(n, &d[2]).min(dot(n, &d[3])))
-}
-
-/// A unit direction that separates the pair well, and the distance of two of its points, to rounding.
-#[inline(always)]
-fn direction<const L: usize>(shape: Shape, d: &[Point<L>; 4]) -> (Point<L>, Lanes<L>) {
-    match shape {
-        Shape::VertexFace => vertex_face_direction(d),
-        Shape::EdgeEdge => edge_edge_direction(d),
-    }
-}
-
-#[inline(always)]
-fn clamped<const L: usize>(t: Lanes<L>) -> Lanes<L> {
-    t.max(Lanes::splat(0.0)).min(Lanes::splat(1.0))
-}
-
-/// The face normal or the direction from the nearest point of an edge, whichever separates farther.
-#[inline(always)]
-fn vertex_face_direction<const L: usize>(d: &[Point<L>; 4]) -> (Point<L>, Lanes<L>) {
-    let edges = [sub(&d[0], &d[1]), sub(&d[1], &d[2]), sub(&d[2], &d[0])];
-    let from_edge = |i: usize| {
-        let t = clamped(dot(&d[i], &edges[i]) / dot(&edges[i], &edges[i]));
-        sub(&d[i], &scale(t, &edges[i]))
-    };
-    let mut offset = from_edge(0);
-    let mut square = dot(&offset, &offset);
-    for i in 1..3 {
-        let other = from_edge(i);
-        let closer = square - dot(&other, &other);
-        offset = if_positive(closer, &other, &offset);
-        square = square.min(dot(&other, &other));
-    }
-    let distance = square.sqrt();
-    let offset = scale(Lanes::splat(1.0) / distance, &offset);
-    let normal = cross(&edges[0], &edges[1]);
-    let length = dot(&normal, &normal).sqrt();
-    let inverse = Lanes::splat(1.0) / length;
-    let normal = scale(dot(&normal, &d[0]).if_positive(inverse, inverse.negate()), &normal);
-    let better = support(&normal, d) - support(&offset, d);
-    (if_positive(better, &normal, &offset), distance)
-}
-
-/// The direction between the closest points of two edges.
-#[inline(always)]
-fn edge_edge_direction<const L: usize>(d: &[Point<L>; 4]) -> (Point<L>, Lanes<L>) {
-    // Points `d0 + s e + t f` with e along the first edge and -f along the second.
-    let (e, f) = (sub(&d[2], &d[0]), sub(&d[1], &d[0]));
-    let (ee, ff, ef) = (dot(&e, &e), dot(&f, &f), dot(&e, &f));
-    let (de, df) = (dot(&d[0], &e), dot(&d[0], &f));
-    let s = clamped((ef * df - ff * de) / (ee * ff - ef * ef));
-    let t = clamped((df + s * ef).negate() / ff);
-    let s = clamped((de + t * ef).negate() / ee);
-    let (along_e, along_f) = (scale(s, &e), scale(t, &f));
-    let offset: Point<L> = std::array::from_fn(|c| d[0][c] + along_e[c] + along_f[c]);
-    let distance = dot(&offset, &offset).sqrt();
-    (scale(Lanes::splat(1.0) / distance, &offset), distance)
 }

@@ -96,6 +96,18 @@ impl Par<'_> {
         }
     }
 
+    /// What `f(i)` gives for `i` in `0..count` where it gives something, in this order.
+    pub fn filter_indexed<T: Send>(&self, count: usize, f: impl Fn(usize) -> Option<T> + Sync) -> Vec<T> {
+        match self.pool() {
+            Some(pool) if count > BLOCK => pool.install(|| {
+                let blocks = (0..count.div_ceil(BLOCK)).into_par_iter().with_max_len(1);
+                let found = blocks.map(|b| (b * BLOCK..count.min((b + 1) * BLOCK)).filter_map(&f).collect::<Vec<T>>());
+                found.collect::<Vec<_>>().into_iter().flatten().collect()
+            }),
+            _ => (0..count).filter_map(f).collect(),
+        }
+    }
+
     /// Calls `f(start, block)` for disjoint blocks of [`BLOCK`] items of `data`.
     pub fn for_each_block<T: Send>(&self, data: &mut [T], f: impl Fn(usize, &mut [T]) + Sync) {
         match self.pool() {

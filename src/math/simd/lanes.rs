@@ -1,24 +1,70 @@
-//! A few doubles side by side, and running one kernel with the widest instructions the machine has.
+//! A few numbers side by side, and running one kernel with the widest instructions the machine has.
 //!
 //! The operations are the same ones in the same order on every path and there is no fused multiply-add, so a kernel
 //! gives the same bits on every machine.
 
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// `N` independent doubles; all operations go lane by lane.
+/// What a lane holds: single or double precision.
+pub trait Number:
+    Copy
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// Zero.
+    const ZERO: Self;
+    /// One.
+    const ONE: Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+}
+
+impl Number for f64 {
+    const ZERO: f64 = 0.0;
+    const ONE: f64 = 1.0;
+    #[inline(always)]
+    fn abs(self) -> f64 {
+        f64::abs(self)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> f64 {
+        f64::sqrt(self)
+    }
+}
+
+impl Number for f32 {
+    const ZERO: f32 = 0.0;
+    const ONE: f32 = 1.0;
+    #[inline(always)]
+    fn abs(self) -> f32 {
+        f32::abs(self)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> f32 {
+        f32::sqrt(self)
+    }
+}
+
+/// `N` independent numbers, doubles unless said otherwise; all operations go lane by lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(32))]
-pub struct Lanes<const N: usize>(pub [f64; N]);
+pub struct Lanes<const N: usize, T = f64>(pub [T; N]);
 
-impl<const N: usize> Lanes<N> {
+impl<const N: usize, T: Number> Lanes<N, T> {
     /// The same value in every lane.
     #[inline(always)]
-    pub fn splat(a: f64) -> Self {
+    pub fn splat(a: T) -> Self {
         Lanes([a; N])
     }
 
     #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+    fn zip(self, other: Self, f: impl Fn(T, T) -> T) -> Self {
         let mut out = self.0;
         for i in 0..N {
             out[i] = f(out[i], other.0[i]);
@@ -28,7 +74,7 @@ impl<const N: usize> Lanes<N> {
 
     // Loops by index: adapters of the standard library are not always inlined, and then lose the wide instructions.
     #[inline(always)]
-    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+    fn map(self, f: impl Fn(T) -> T) -> Self {
         let mut out = self.0;
         for i in 0..N {
             out[i] = f(out[i]);
@@ -51,13 +97,13 @@ impl<const N: usize> Lanes<N> {
     /// Absolute values.
     #[inline(always)]
     pub fn abs(self) -> Self {
-        self.map(f64::abs)
+        self.map(T::abs)
     }
 
     /// Square roots.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
-        self.map(f64::sqrt)
+        self.map(T::sqrt)
     }
 
     /// `a` where this is greater than zero, `b` elsewhere, also where it is NaN.
@@ -65,7 +111,7 @@ impl<const N: usize> Lanes<N> {
     pub fn if_positive(self, a: Self, b: Self) -> Self {
         let mut out = b.0;
         for i in 0..N {
-            out[i] = if self.0[i] > 0.0 { a.0[i] } else { out[i] };
+            out[i] = if self.0[i] > T::ZERO { a.0[i] } else { out[i] };
         }
         Lanes(out)
     }
@@ -77,7 +123,7 @@ impl<const N: usize> Lanes<N> {
     }
 }
 
-impl<const N: usize> Add for Lanes<N> {
+impl<const N: usize, T: Number> Add for Lanes<N, T> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -85,7 +131,7 @@ impl<const N: usize> Add for Lanes<N> {
     }
 }
 
-impl<const N: usize> Sub for Lanes<N> {
+impl<const N: usize, T: Number> Sub for Lanes<N, T> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -93,7 +139,7 @@ impl<const N: usize> Sub for Lanes<N> {
     }
 }
 
-impl<const N: usize> Mul for Lanes<N> {
+impl<const N: usize, T: Number> Mul for Lanes<N, T> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -101,7 +147,7 @@ impl<const N: usize> Mul for Lanes<N> {
     }
 }
 
-impl<const N: usize> Div for Lanes<N> {
+impl<const N: usize, T: Number> Div for Lanes<N, T> {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {

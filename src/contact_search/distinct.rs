@@ -1,0 +1,132 @@
+//! One contact for each that is geometrically distinct: what lies on borders is found with every pair that shares them.
+
+use super::contact::Contact;
+use super::pair::PairKind;
+use crate::math::{Vec3, dot, scale};
+use crate::parallel::Par;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+/// Leaves one contact per geometrically distinct one of a list sorted by pair: drops what repeats an earlier contact, and
+/// what is no closest point.
+///
+/// Closest points on a border, `(p, edge)` or `(p, vertex)`, are found with every pair that shares that border; the
+/// first pair is kept, with the largest thickness. They are no contact of their own where a face at that border is
+/// strictly nearer to `p`: then the point slides off the border into the face, which has its own row. A vertex that is
+/// nearest to an edge or a corner keeps that row. Of two vertices both must have something nearer. Cost: linear.
+pub(super) fn distinct(contacts: &mut Vec<Contact>, par: Par) {
+    let mut kept = vec![true; contacts.len()];
+    let mut borders = Borders::for_contacts(contacts.len());
+    for i in 0..contacts.len() {
+        let Some(border) = Border::of(&contacts[i], i) else { continue };
+        // The same vertices may carry two contacts on opposite sides only if the normals differ.
+        match borders.with_key(border.key).last().filter(|last| dot(last.normal, border.normal) > 0.5) {
+            Some(first) => {
+                let first = first.contact;
+                contacts[first].thickness = contacts[first].thickness.max(contacts[i].thickness);
+                kept[i] = false;
+            }
+            None => borders.insert(border),
+        }
+    }
+    let faces = contacts.partition_point(|c| c.pair.kind == PairKind::VertexFace);
+    par.for_each_block(&mut contacts[..faces], |_, contacts| {
+        contacts.iter().for_each(|c| borders.mark_farther_than(c))
+    });
+    let both = Border::BOTH;
+    borders.list.iter().filter(|b| b.nearer.load(Ordering::Relaxed) == both).for_each(|b| kept[b.contact] = false);
+    let mut keep = kept.into_iter();
+    contacts.retain(|_| keep.next().unwrap_or(true));
+}
+
+/// A contact between a vertex and an edge or another vertex.
+struct Border {
+    /// The vertex and the ends of the edge, in order; or both vertices in order and [`u32::MAX`].
+    key: [u32; 3],
+    contact: usize,
+    /// Unit normal, towards the first vertex of the key.
+    normal: Vec3,
+    /// Gap of the contact at the start `[m]`.
+    gap: f64,
+    /// Bits: whether a face is nearer to the first vertex of the key, and to the second.
+    nearer: AtomicU8,
+}
+
+impl Border {
+    /// A face is nearer to both vertices of the key.
+    const BOTH: u8 = 3;
+
+    /// The border that the closest points of a contact lie on; `None` inside a face or where two edges cross.
+    fn of(contact: &Contact, index: usize) -> Option<Border> {
+        let (mut ends, mut counts) = ([[u32::MAX; 3]; 2], [0; 2]);
+        for k in 0..4 {
+            if contact.weights[k] != 0.0 {
+                let side = usize::from(contact.on_second(k));
+                ends[side][counts[side].min(2)] = contact.vertices[k];
+                counts[side] += 1;
+            }
+        }
+        let [a, b] = ends;
+        let ordered = |first: u32, e: [u32; 3]| [first, e[0].min(e[1]), e[0].max(e[1])];
+        let (key, nearer) = match counts {
+            [1, 1] => ([a[0].min(b[0]), a[0].max(b[0]), u32::MAX], 0),
+            [1, 2] => (ordered(a[0], b), 2),
+            [2, 1] => (ordered(b[0], a), 2),
+            _ => return None,
+        };
+        let forwards = key[0] == a[0] && counts[0] == 1;
+        let normal = if forwards { contact.normal } else { scale(-1.0, contact.normal) };
+        Some(Border { key, contact: index, normal, gap: contact.start_gap, nearer: AtomicU8::new(nearer) })
+    }
+}
+
+/// Borders by key. Several may have the same one.
+struct Borders {
+    list: Vec<Border>,
+    /// Numbers in the list, by hash and then in the order of insertion; [`EMPTY`] behind the last of each.
+    slots: Vec<u32>,
+}
+
+const EMPTY: u32 = u32::MAX;
+
+impl Borders {
+    /// Room for the borders of so many contacts.
+    fn for_contacts(count: usize) -> Borders {
+        Borders { list: Vec::new(), slots: vec![EMPTY; (count + count / 2 + 2).next_power_of_two()] }
+    }
+
+    /// The slots of a key and what follows them, from its hash on.
+    fn slots_of(&self, key: [u32; 3]) -> impl Iterator<Item = usize> + use<> {
+        let mixed =
+            key.iter().fold(0_u64, |h, k| (h ^ u64::from(*k)).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29));
+        let mask = self.slots.len() - 1;
+        (0..).map(move |step: usize| (mixed as usize).wrapping_add(step) & mask)
+    }
+
+    /// The borders with a key, in the order of insertion.
+    fn with_key(&self, key: [u32; 3]) -> impl Iterator<Item = &Border> {
+        let used = self.slots_of(key).map(|slot| self.slots[slot]).take_while(|number| *number != EMPTY);
+        used.map(|number| &self.list[number as usize]).filter(move |border| border.key == key)
+    }
+
+    fn insert(&mut self, border: Border) {
+        if let Some(free) = self.slots_of(border.key).find(|slot| self.slots[*slot] == EMPTY) {
+            self.slots[free] = self.list.len() as u32;
+            self.list.push(border);
+        }
+    }
+
+    /// Marks the borders of the face of a vertex-face contact that are farther from its vertex than the face is.
+    fn mark_farther_than(&self, contact: &Contact) {
+        let [p, face @ ..] = contact.vertices;
+        for k in 0..3 {
+            let (v, w) = (face[k], face[(k + 1) % 3]);
+            for (key, bit) in
+                [([p, v.min(w), v.max(w)], 1), ([p.min(v), p.max(v), u32::MAX], if p > v { 2 } else { 1 })]
+            {
+                for border in self.with_key(key).filter(|border| contact.start_gap < border.gap) {
+                    border.nearer.fetch_or(bit, Ordering::Relaxed);
+                }
+            }
+        }
+    }
+}
