@@ -126,7 +126,7 @@ impl<'a> Momentum<'a> {
 /// on a light one takes passes in proportion to the masses.
 struct PassSchedule {
     level: usize,
-    stagnation: Stagnation,
+    stagnation: Stagnation<1>,
     /// Blocks of A.
     blocks: usize,
 }
@@ -144,7 +144,7 @@ impl PassSchedule {
 
     /// Judges the contact residual at `iteration`; a pass relaxes `contacts`. Returns whether it stagnated.
     fn observe(&mut self, residual: f64, iteration: u32, contacts: usize) -> bool {
-        let stagnated = self.stagnation.seen(residual, iteration);
+        let stagnated = self.stagnation.seen([residual], iteration);
         if let Some(next) = PASSES.get(self.level + 1)
             && stagnated
             && (*next <= PASSES_ALWAYS || *next as usize * contacts <= self.blocks)
@@ -210,7 +210,7 @@ pub(super) fn run(
             engine.account(work);
             return Run { iterations: k, ending: Ending::Stagnated, error: None };
         }
-        let stagnated = stagnation.seen(residuals.merit(), k);
+        let stagnated = stagnation.seen([residuals.merit()], k);
         if stagnated && let Engine::Single(_) = &engine {
             // What is left may be rounding.
             engine.account(work);

@@ -255,7 +255,7 @@ impl Lagrangian<'_, '_> {
         &mut self,
         at: &mut Iterate,
         iterations_max: u32,
-        mut stagnation: Stagnation,
+        mut stagnation: Stagnation<2>,
         buffers: &mut MeasureBuffers,
     ) -> Run {
         let mut now = at.clone();
@@ -310,7 +310,7 @@ impl Lagrangian<'_, '_> {
                 Verdict::Continue => {}
                 Verdict::Overflowed => return Run { iterations, ending: Ending::Stagnated, error: None },
             }
-            if polish.is_none() && stagnation.seen(residuals.merit(), iterations) {
+            if polish.is_none() && stagnation.seen([residuals.merit(), residuals.contact_energy.sqrt()], iterations) {
                 return Run { iterations, ending: Ending::Stagnated, error: None };
             }
         }

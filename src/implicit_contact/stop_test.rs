@@ -106,28 +106,31 @@ fn balanced(task: &Task, at: &mut Iterate, buffers: &MeasureBuffers, work: &mut 
     contact_residuals(task, &at.dv, &at.p).contact() <= tolerance
 }
 
-/// Watches a residual for stagnation.
-pub(super) struct Stagnation {
+/// Watches residuals for stagnation: the iterations since one of them was last halved.
+pub(super) struct Stagnation<const N: usize> {
     patience: u32,
-    reference: f64,
+    references: [f64; N],
     since: u32,
 }
 
-impl Stagnation {
-    /// Stagnation is `patience` iterations without halving the residual.
-    pub fn new(patience: u32) -> Stagnation {
-        Stagnation { patience, reference: f64::INFINITY, since: 0 }
+impl<const N: usize> Stagnation<N> {
+    /// Stagnation is `patience` iterations in which none of the residuals halves.
+    pub fn new(patience: u32) -> Stagnation<N> {
+        Stagnation { patience, references: [f64::INFINITY; N], since: 0 }
     }
 
-    /// Whether the residual has stagnated at `iteration`; if so, the count begins again.
-    pub fn seen(&mut self, merit: f64, iteration: u32) -> bool {
-        if merit <= 0.5 * self.reference {
-            self.reference = merit;
-            self.since = iteration;
-        } else if iteration - self.since >= self.patience {
-            self.since = iteration;
-            return true;
+    /// Whether the residuals have stagnated at `iteration`; if so, the count begins again.
+    pub fn seen(&mut self, residuals: [f64; N], iteration: u32) -> bool {
+        for (reference, residual) in self.references.iter_mut().zip(residuals) {
+            if residual <= 0.5 * *reference {
+                *reference = residual;
+                self.since = iteration;
+            }
         }
-        false
+        let stagnated = iteration - self.since >= self.patience;
+        if stagnated {
+            self.since = iteration;
+        }
+        stagnated
     }
 }

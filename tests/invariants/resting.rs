@@ -56,10 +56,10 @@ fn iterations_after(world: &mut World, change: impl Fn(&mut World)) -> u32 {
 }
 
 /// Ten blocks, a little out of line: tall for passes over the contacts, and their rows share the load. Within three
-/// seconds they are quiet, by the solver alone, and stay so.
+/// seconds they are quiet, by the solver alone, and stay so, at the default tolerance and at a third of it.
 #[test]
 fn a_tall_stack_goes_quiet() {
-    for seed in 0..4 {
+    for (seed, share) in [(0, 1.0), (1, 1.0), (2, 1.0), (3, 1.0), (0, 1.0 / 3.0), (3, 1.0 / 3.0)] {
         let mut jitter = Jitter(seed);
         let mut plan = Plan::rubbing(0.5);
         let side = 0.2;
@@ -71,10 +71,12 @@ fn a_tall_stack_goes_quiet() {
         plan.half_space([0.0, 0.0, 1.0], 0.0);
         let mut world = plan.build();
         world.gravity = [0.0, 0.0, -9.81];
+        world.settings.contact_tolerance *= share;
+        let tolerance = world.settings.contact_tolerance;
         let masses = world.masses();
         for step in 0..500 {
             let report = world.step();
-            assert!(report.complementarity_residual < 1e-3, "seed {seed} step {step}: {report:?}");
+            assert!(report.complementarity_residual <= tolerance, "seed {seed} step {step}: {report:?}");
             assert!(report.parts == 1 && report.rounds <= 3, "seed {seed} step {step}: {report:?}");
             assert!(!report.not_converged, "seed {seed} step {step}: {report:?}");
             let energy = kinetic(&masses, &world.velocities) / 10.0;
