@@ -104,7 +104,7 @@ impl PartMethod for Filter {
         let near = near_contacts(segment.model, around.filter, passing, candidates, start, &motion.end, 1.0, par);
         report.times.search += lap(&mut clock);
         let stiffness = settings.filter.repulsion_stiffness;
-        repel(&mut motion, &near, stiffness, settings.recovery_fraction, segment.dt);
+        repel(&mut motion, &near, stiffness, settings.recovery_fraction, (around.metric, segment.dt, par));
         report.times.solve += lap(&mut clock);
         // (4) Impulses.
         let hits = iterate_impulses(around, segment, passing, &mut motion, search, report)?;

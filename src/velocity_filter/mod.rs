@@ -6,11 +6,13 @@
 //! * `stage_rows`: the rows of a stage while it gives them impulses
 //! * `row_response`: the response of one row: normal impulse, friction
 //! * `repulsion`: weak springs between what is closer than its thickness
+//! * `coupled_springs`: the same where a matrix couples velocities
 //! * `impulse`: passes of impulses and continuous detection
 //!
 //! What is left of collisions after that is a matter for the fail-safes, which all methods share.
 
 mod advance;
+mod coupled_springs;
 mod impulse;
 mod motion;
 mod repulsion;

@@ -16,6 +16,10 @@ pub struct FilteredMotion<'a> {
     pub velocities: Vec<Vec3>,
     /// Impulse per block `[N s]`.
     pub impulses: Vec<Vec3>,
+    /// Velocities before impulses over lumped masses: unconstrained, with what a matrix made of springs.
+    base: Vec<Vec3>,
+    /// Impulses over lumped masses `[N s]`.
+    lumped: Vec<Vec3>,
     /// End of the motion as the host will get it.
     pub end: State,
     /// Contacts in the order in which they were treated.
@@ -29,7 +33,8 @@ impl<'a> FilteredMotion<'a> {
         let mut end = State::default();
         segment.end_state(&velocities, 1.0, true, &mut end);
         let impulses = vec![[0.0; 3]; velocities.len()];
-        FilteredMotion { segment, metric, velocities, impulses, end, contacts: Vec::new() }
+        let (base, lumped) = (velocities.clone(), impulses.clone());
+        FilteredMotion { segment, metric, velocities, impulses, base, lumped, end, contacts: Vec::new() }
     }
 
     /// The rows of contacts about the motion as it is.
@@ -54,11 +59,17 @@ impl<'a> FilteredMotion<'a> {
             if let Some(row) = row.filter(|row| stage.impulses[*row] != [0.0; 3]) {
                 let impulse = rows.impulse(row, stage.impulses[row]);
                 rows.scatter(row, impulse, &mut self.impulses);
+                if stage.coupled_change().is_none() {
+                    rows.scatter(row, impulse, &mut self.lumped);
+                }
                 booked.required_gap += self.segment.dt * stage.separations[row];
                 booked.solved = Solved { impulse, tangent: rows.frames[row][1], sticks: stage.sticks[row] };
                 pushed += 1;
             }
             self.contacts.push(booked);
+        }
+        if let Some(change) = stage.coupled_change() {
+            self.base.iter_mut().zip(change).for_each(|(v, dv)| *v = add(*v, *dv));
         }
         if pushed > 0 {
             self.follow();
@@ -79,9 +90,9 @@ impl<'a> FilteredMotion<'a> {
 
     /// Velocities and end of the impulses given so far: to rounding those, whatever the order they came in.
     fn follow(&mut self) {
-        let unconstrained = &self.segment.drives.velocities;
-        for (block, f) in self.impulses.iter().enumerate().filter(|(_, f)| **f != [0.0; 3]) {
-            self.velocities[block] = add(unconstrained[block], mat_vec(&inverse_mass(self.metric, block), *f));
+        self.velocities.clone_from(&self.base);
+        for (block, f) in self.lumped.iter().enumerate().filter(|(_, f)| **f != [0.0; 3]) {
+            self.velocities[block] = add(self.base[block], mat_vec(&inverse_mass(self.metric, block), *f));
         }
         self.segment.end_state(&self.velocities, 1.0, true, &mut self.end);
     }

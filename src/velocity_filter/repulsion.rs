@@ -1,10 +1,13 @@
 //! Stage 3: weak springs between what starts closer than its thickness [Harmon10, §3.1; Bridson02, §7.2].
 
+use super::coupled_springs::{effective_mass, settle_coupled};
 use super::motion::FilteredMotion;
 use super::row_response::WELL_WITHIN;
 use super::stage_rows::StageRows;
+use crate::constraint::Metric;
 use crate::contact_search::Contact;
 use crate::math::{Vec3, dot, scale};
+use crate::parallel::Par;
 
 /// Share of the thickness that pairs may overlap without being pushed apart: what rests stays in touch, and keeps its
 /// friction, instead of hopping out of reach and falling back.
@@ -23,7 +26,13 @@ const SETTLED: f64 = 5e-3;
 /// pushed until it separates by `recovery` times its overlap beyond a tenth of the thickness, and one that separates faster
 /// already is left alone. Friction acts within `mu` times what its spring gives. What they add to the kinetic energy is at
 /// most the sum of `lambda` times the speed asked for.
-pub fn repel(motion: &mut FilteredMotion, contacts: &[Contact], stiffness: f64, recovery: f64, dt: f64) -> u32 {
+pub fn repel(
+    motion: &mut FilteredMotion,
+    contacts: &[Contact],
+    stiffness: f64,
+    recovery: f64,
+    (metric, dt, par): (&Metric, f64, Par),
+) -> u32 {
     if stiffness == 0.0 {
         return 0;
     }
@@ -36,6 +45,13 @@ pub fn repel(motion: &mut FilteredMotion, contacts: &[Contact], stiffness: f64, 
     let resting_speed = |contact: &u32| RESTING_SHARE * contacts[*contact as usize].thickness / dt;
     let excess = overlap_speeds.iter().zip(&rows.built.contact).map(|(speed, c)| (speed - resting_speed(c)).max(0.0));
     rows.separations = excess.map(|speed| recovery * speed).collect();
+    let is_coupled = rows.built.rows.blocks.iter().any(|block| !metric.uncoupled[*block as usize]);
+    if is_coupled {
+        let mass = |row: usize| effective_mass(&rows.built.rows, row, metric).unwrap_or(0.0);
+        let limits: Vec<f64> = (0..rows.len()).map(|row| stiffness * overlap_speeds[row] * mass(row)).collect();
+        settle_coupled(&mut rows, &limits, metric, par);
+        return motion.take(contacts, 0, rows);
+    }
     let limits: Vec<f64> = overlap_speeds
         .iter()
         .zip(&rows.responses)

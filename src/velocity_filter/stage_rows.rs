@@ -19,6 +19,8 @@ pub struct StageRows {
     pub separations: Vec<f64>,
     /// Change of velocity per block.
     change: Vec<Vec3>,
+    /// Whether a matrix made it.
+    coupled: bool,
 }
 
 impl StageRows {
@@ -31,6 +33,7 @@ impl StageRows {
             sticks: vec![false; rows],
             separations: vec![0.0; rows],
             change: vec![[0.0; 3]; metric.lumped.len()],
+            coupled: false,
             built,
             masses,
         }
@@ -48,6 +51,17 @@ impl StageRows {
         // About the motion itself, what a row asks for to keep its start gap is its own approach.
         let [s1, s2] = rows.sliding_velocities[row];
         add([-rows.normal_targets[row], s1, s2], rows.velocity(row, &self.change))
+    }
+
+    /// Takes the impulses of all rows, and the change of velocity that they made under a matrix.
+    pub fn respond(&mut self, impulses: Vec<Vec3>, sticks: Vec<bool>, change: Vec<Vec3>) {
+        (self.impulses, self.sticks, self.change) = (impulses, sticks, change);
+        self.coupled = true;
+    }
+
+    /// The change of velocity per block, where a matrix made it of the impulses.
+    pub fn coupled_change(&self) -> Option<&[Vec3]> {
+        self.coupled.then_some(&self.change)
     }
 
     /// Adds `p` to the impulse of a row.

@@ -32,6 +32,16 @@ fn friction_slows_the_ribbon_and_holds_it() {
     assert!(ways.is_sorted_by(|a, b| *a > 1.1 * b), "{ways:?}");
 }
 
+/// [Harmon10, Fig. 3.6]: cloth that a ball shoves into a funnel slides in and is not stretched; springs
+/// that knew of masses alone left 2 J in it by then.
+#[test]
+fn cloth_slides_into_the_funnel_unstretched() {
+    let folder = Folder::new("funnel");
+    let line = run(&folder, "funnel_coarse", &["--steps", "130"]);
+    let stretched = line["elastic_energy_end"].as_f64().expect("a number");
+    assert!(stretched < 0.1, "{line}");
+}
+
 /// A hand that closes farther than the cloth in it leaves room for: the steps that press end pinched and name the cloth
 /// and the fingers; then the hand opens, and the cloth lies free.
 #[test]
