@@ -15,6 +15,9 @@ use super::stop_test::{Ending, Run, Stagnation, StopTest, Verdict};
 const FIRST_SCALE: f64 = 1.9;
 /// Iterations between two measurements, which also renew what single precision adds increments to.
 const MEASURE_EVERY: u32 = 10;
+/// The same while a residual is so many times its tolerance: a measurement costs three iterations.
+const MEASURE_EVERY_FAR: u32 = 20;
+const FAR: f64 = 2.0;
 /// Passes per iteration, raised on stagnation.
 const PASSES: [u32; 7] = [1, 3, 6, 12, 25, 50, 100];
 /// Passes that are made where need be at any price; more only while they relax no more contacts than A has blocks, since
@@ -181,12 +184,16 @@ pub(super) fn run(
     let mut schedule = PassSchedule::new(task.problem.matrix.values.len(), control.passes);
     let mut stagnation = Stagnation::new(control.patience);
     let mut now = Iterate::default();
+    let mut far = false;
     let mut k = 0;
     while k < control.iterations_max {
-        let steps = MEASURE_EVERY.min(control.iterations_max - k);
+        let every = if far { MEASURE_EVERY_FAR } else { MEASURE_EVERY };
+        let steps = every.min(control.iterations_max - k);
         engine.advance(steps, schedule.passes());
         k += steps;
         let residuals = engine.measure(&mut now, buffers);
+        far = residuals.contact() > FAR * task.settings.contact_tolerance
+            || residuals.dynamics > FAR * task.settings.velocity_tolerance;
         match test.check(task, &now, &residuals, at, buffers, work) {
             Verdict::Converged(e) => {
                 engine.account(work);

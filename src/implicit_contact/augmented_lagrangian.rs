@@ -220,9 +220,7 @@ fn run_all(
     let relative = if direct.is_some() { STIFFNESS_FACTORED } else { STIFFNESS };
     let mut l = Lagrangian {
         task,
-        penalties: task.par.map_indexed(contacts, |c| {
-            penalty(relative, task.packed.natural_scale(c, task.problem.rows, task.problem.inverse_diagonal))
-        }),
+        penalties: task.par.map_indexed(contacts, |c| penalty(relative, task.packed.natural_scale(c))),
         normals: vec![0.0; contacts],
         normal_steps: vec![0.0; contacts],
         missed: vec![f64::INFINITY; contacts],

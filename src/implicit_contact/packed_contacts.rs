@@ -43,6 +43,8 @@ pub(super) struct PackedContacts {
     pub groups: Vec<usize>,
     /// The contacts of each block.
     pub incidence: Incidence,
+    /// Scales of their natural maps.
+    scales: Vec<[f64; 2]>,
 }
 
 /// World velocity that contact `contact` sees in `v`.
@@ -160,7 +162,12 @@ impl PackedContacts {
         let contacts = par.map_indexed(rows.len(), |k| pack(rows, order.order[k] as usize));
         let mut incidence = Incidence::default();
         incidence.rebuild(rows, blocks, contacts.iter().map(|c| c.source as usize));
-        PackedContacts { contacts, groups: order.offsets, incidence }
+        let mut packed = PackedContacts { contacts, groups: order.offsets, incidence, scales: Vec::new() };
+        packed.scales = par.map_indexed(rows.len(), |c| {
+            let metric = packed.metric(c, rows, problem.inverse_diagonal);
+            [metric.entries[0], if metric.tangent_step > 0.0 { 1.0 / metric.tangent_step } else { 0.0 }]
+        });
+        packed
     }
 
     /// The contacts `list` alone, in its order. Cost: a pass over their entries and over the blocks.
@@ -169,7 +176,8 @@ impl PackedContacts {
         let mut incidence = Incidence::default();
         let sources = contacts.iter().map(|c| c.source as usize);
         incidence.rebuild(problem.rows, problem.inverse_diagonal.len(), sources);
-        PackedContacts { groups: vec![0, contacts.len()], contacts, incidence }
+        let scales = list.iter().map(|c| self.scales[*c]).collect();
+        PackedContacts { groups: vec![0, contacts.len()], contacts, incidence, scales }
     }
 
     /// Local metric of contact `c` for the block-diagonal metric with this inverse.
@@ -270,9 +278,8 @@ impl PackedContacts {
 
     /// Scales of the natural map of contact `c`: `G_nn` and the largest tangential eigenvalue for the block diagonal of A
     /// itself.
-    pub fn natural_scale(&self, c: usize, rows: &RowSet, inverse_diagonal: &[Mat3]) -> [f64; 2] {
-        let metric = self.metric(c, rows, inverse_diagonal);
-        [metric.entries[0], if metric.tangent_step > 0.0 { 1.0 / metric.tangent_step } else { 0.0 }]
+    pub fn natural_scale(&self, c: usize) -> [f64; 2] {
+        self.scales[c]
     }
 
     /// Natural-map residuals of contact `c` at `p` and contact velocity `w` `[m/s]`: normal, tangential.

@@ -78,7 +78,7 @@ fn count_contact(task: &Task, r: &mut Residuals, c: usize, dv: &[Vec3], p: Vec3)
     if p == [0.0; 3] && w[0] >= 0.0 {
         return;
     }
-    let scales = task.packed.natural_scale(c, task.problem.rows, task.problem.inverse_diagonal);
+    let scales = task.packed.natural_scale(c);
     let [n, t] = task.packed.natural_map(task.settings.friction_cone, c, scales, p, w);
     if !(n.is_finite() && t.is_finite()) {
         r.normal = f64::INFINITY;

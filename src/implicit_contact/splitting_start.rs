@@ -36,9 +36,7 @@ fn factor(task: &Task, stiffness: impl Fn(usize) -> Option<Mat3> + Sync) -> Opti
 /// is as before).
 pub(super) fn run(task: &Task, at: &mut Iterate, iterations: u32, work: &mut Work) -> u32 {
     let Task { problem, packed, single, par, .. } = *task;
-    let rho: Vec<f64> = par.map_indexed(packed.contacts.len(), |c| {
-        stiffness(packed.natural_scale(c, problem.rows, problem.inverse_diagonal))
-    });
+    let rho: Vec<f64> = par.map_indexed(packed.contacts.len(), |c| stiffness(packed.natural_scale(c)));
     let isotropic = |c: usize| {
         let r = rho[c];
         (r > 0.0).then_some([[r, 0.0, 0.0], [0.0, r, 0.0], [0.0, 0.0, r]])
