@@ -30,6 +30,9 @@ const PROGRESS: f64 = 0.5;
 /// Complementarity, relative to the largest demand, at which the projection has converged.
 const TOLERANCE: f64 = 1e-13;
 
+/// Where unknowns would have to change by this many times the largest demand, in the mean square, rows contradict each other.
+const ESCAPE: f64 = 16.0;
+
 /// Complementarity that is accepted where no more is to be had.
 pub(super) const TRUSTED: f64 = 1e-4;
 
@@ -76,6 +79,9 @@ pub(super) fn unilateral(
         if stalls || steps >= NEWTON_STEPS {
             break;
         }
+        if state.shortest(demand) > ESCAPE * size * (3.0 * rows.width as f64).sqrt() {
+            return state.finished(false);
+        }
         last = complementarity;
         let sigma = penalties[update.min(penalties.len() - 1)];
         let tolerance = 1e-2 * size * complementarity.min(1.0);
@@ -96,6 +102,13 @@ struct Multipliers {
 impl Multipliers {
     fn new(rows: &ZoneRows, demand: &[f64]) -> Multipliers {
         Multipliers { lambda: vec![0.0; rows.len()], y: vec![[0.0; 3]; rows.width], left: demand.to_vec() }
+    }
+
+    /// A length that no `y` with `A y >= demand` falls below, by duality: grows without bound where there is none.
+    fn shortest(&self, demand: &[f64]) -> f64 {
+        let gained: f64 = self.lambda.iter().zip(demand).map(|(l, c)| l * c).sum();
+        let length = inner(&self.y, &self.y).sqrt();
+        if length > 0.0 { gained / length } else { 0.0 }
     }
 
     /// Largest component of `min(lambda, A y - demand)`.

@@ -7,7 +7,7 @@ use super::sweep::Sweep;
 use super::zone_projection::{Projected, ZoneResponse, project};
 use crate::constraint::{BuiltRows, Linearisation, Metric, build_rows};
 use crate::contact_search::{CandidateSearch, Contact, Hit, Pair};
-use crate::math::{Vec3, add, cross, mat_vec, sub};
+use crate::math::{Vec3, add, cross, mat_vec, norm, sub};
 use crate::model::{FailSafe, State};
 use std::collections::BTreeMap;
 
@@ -23,6 +23,10 @@ const ROWS_OF_PAIR: u32 = 4;
 /// Share of their gaps that rows ask for where the whole leaves no solution: above the half that continuous detection
 /// keeps.
 const SQUEEZED: f64 = 0.6;
+
+/// A zone that scripted parts squeeze has no projection where it would have to slip out this many times as fast as what its
+/// rows ask for.
+const ESCAPE: f64 = 16.0;
 
 /// How often a zone with rigid bodies is projected in a round, each time about the motion found last.
 const LINEARISATIONS: usize = 2;
@@ -101,7 +105,7 @@ pub fn resolve_zones(
         let impulses = &mut zones.impulses;
         answer(sweep, metric, &nodes, response, tentative, &touched, impulses, &mut outcome.velocities, &mut reports);
         // A projection that scripted parts leave no room for is not tried again.
-        let failed = |zone: &&Zone| reports.get(&zone.root).is_some_and(|report| !report.converged);
+        let failed = |zone: &&Zone| reports.get(&zone.root).is_some_and(|r| r.fail_safe == FailSafe::RigidZone);
         touched.iter().filter(failed).for_each(|zone| zones.rigid[zone.root] = true);
         outcome.rounds += 1;
         (outcome.end, outcome.hits) = match outcome.rounds {
@@ -174,14 +178,17 @@ fn answer(
     reports: &mut BTreeMap<usize, ZoneReport>,
 ) {
     let segment = &sweep.segment;
+    let make_rigid = |zone: &Zone, velocities: &mut [Vec3]| {
+        let moved = move_zone(segment, metric, nodes, &zone.movable, &zone.scripted, tentative, velocities);
+        let mut report = report_of(zone, FailSafe::RigidZone);
+        report.residual = moved.misfit;
+        report.angular_momentum_change = moved.angular_momentum_change;
+        report
+    };
     for zone in zones {
         reset(nodes, zone, tentative, velocities);
         if zone.rigid {
-            let moved = move_zone(segment, metric, nodes, &zone.movable, &zone.scripted, tentative, velocities);
-            let mut report = report_of(zone, FailSafe::RigidZone);
-            report.residual = moved.misfit;
-            report.angular_momentum_change = moved.angular_momentum_change;
-            reports.insert(zone.root, report);
+            reports.insert(zone.root, make_rigid(zone, velocities));
         }
     }
     let projected: Vec<&Zone> = zones.iter().filter(|zone| !zone.rigid).collect();
@@ -194,6 +201,8 @@ fn answer(
     let gaps: Vec<f64> = contacts.iter().map(gap).collect();
     let frames = vec![None; contacts.len()];
     let mut end = State::default();
+    // The fastest that a row of each asks for.
+    let mut asked = vec![0.0_f64; projected.len()];
     for _ in 0..if turning { LINEARISATIONS } else { 1 } {
         if projected.is_empty() {
             break;
@@ -203,11 +212,12 @@ fn answer(
         let about = Linearisation { start, end: &end, velocities, unconstrained: tentative, dt };
         let built = build_rows(segment.model, metric, &contacts, &gaps, &frames, &about);
         let (mut first, mut tasks) = (0, Vec::with_capacity(projected.len()));
-        for zone in &projected {
+        for (zone, asked) in projected.iter().zip(&mut asked) {
             let last = first + zone.contacts.len() as u32;
             let row = |contact: u32| built.contact.partition_point(|c| *c < contact);
             let of: Vec<usize> = (row(first)..row(last)).collect();
             let collision = |row: &usize| zone.collisions[(built.contact[*row] - first) as usize];
+            *asked = of.iter().fold(*asked, |most, row| most.max(built.rows.normal_targets[*row].abs()));
             let guess = of.iter().map(|row| impulses[collision(row)]).collect();
             first = last;
             tasks.push(Task { zone, of, guess, projected: None });
@@ -229,8 +239,14 @@ fn answer(
             reports.insert(zone.root, report);
         }
     }
-    for zone in projected {
-        if let Some(report) = reports.get_mut(&zone.root) {
+    for (zone, asked) in projected.into_iter().zip(asked) {
+        let Some(report) = reports.get_mut(&zone.root) else { continue };
+        let change = |n: &usize| norm(sub(velocities[nodes.first_block(*n)], tentative[nodes.first_block(*n)]));
+        let slips = !zone.scripted.is_empty() && zone.movable.iter().any(|n| change(n) > ESCAPE * asked);
+        if slips || !report.converged {
+            reset(nodes, zone, tentative, velocities);
+            *report = make_rigid(zone, velocities);
+        } else {
             report.angular_momentum_change = angular_momentum_change(sweep, metric, nodes, zone, tentative, velocities);
         }
     }
