@@ -1,7 +1,7 @@
 //! Exact intersections of a state with witnesses, the tangled components they make, and the sweep between two states.
 
 use super::candidates::{CandidateSearch, primitives};
-use super::near::half_space_pairs;
+use super::near::{half_space_pair, half_spaces};
 use super::pair::BodyFilter;
 use super::passing::Passing;
 use super::swept::{Hit, swept_hits};
@@ -55,13 +55,17 @@ pub fn intersections_with(
         });
         edge.iter().chain(&face).for_each(|v| tangle.passing.insert(*v, model.rest.len()));
     }
-    for pair in half_space_pairs(model, filter) {
-        let [body, plane] = pair.bodies(model);
-        let (x, h) = (state.positions[pair.features[0] as usize], &state.half_spaces[plane]);
-        if plane_side(h.normal, h.offset, x) < 0 {
+    for plane in half_spaces(model) {
+        let h = &state.half_spaces[plane];
+        let beyond = par.filter_indexed(model.contact_vertices.len(), |i| {
+            let vertex = half_space_pair(model, filter, i, plane)?.features[0];
+            (plane_side(h.normal, h.offset, state.positions[vertex as usize]) < 0).then_some(vertex)
+        });
+        for vertex in beyond {
+            let x = state.positions[vertex as usize];
             let on_plane = add_scaled(x, h.offset - dot(h.normal, x), h.normal);
-            tangle.witnesses.push(half_space_witness(model, pair.features[0], [body, plane], on_plane));
-            tangle.passing.insert(pair.features[0], model.rest.len());
+            tangle.witnesses.push(half_space_witness(model, vertex, [body_of(vertex), plane], on_plane));
+            tangle.passing.insert(vertex, model.rest.len());
         }
     }
     tangle

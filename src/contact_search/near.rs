@@ -30,17 +30,11 @@ pub fn near_contacts(
     let near = |i: usize| near_mesh_pair(model, passing, candidate(candidates, open[i] as usize), x, factor);
     let mut contacts = par.filter_indexed(open.len(), near);
     distinct(&mut contacts, par);
-    for pair in half_space_pairs(model, filter) {
-        if passing.touches(&pair.features[..1]) {
-            continue;
-        }
-        let [body, plane] = pair.bodies(model);
-        let thickness = model.bodies[body].half_thickness + model.bodies[plane].half_thickness;
-        let x0 = start.positions[pair.features[0] as usize];
-        let contact = half_space_contact(pair, &start.half_spaces[plane], &end.half_spaces[plane], x0, thickness);
-        if contact.start_gap < factor * thickness {
-            contacts.push(contact);
-        }
+    for plane in half_spaces(model) {
+        contacts.extend(par.filter_indexed(model.contact_vertices.len(), |i| {
+            let pair = half_space_pair(model, filter, i, plane)?;
+            near_half_space(model, passing, pair, start, end, factor)
+        }));
     }
     contacts
 }
@@ -54,17 +48,35 @@ pub(super) fn candidate(candidates: &Candidates, i: usize) -> Pair {
     }
 }
 
-/// All vertex-half-space pairs that the filter allows.
-pub(super) fn half_space_pairs<'a>(model: &'a Model, filter: &'a BodyFilter) -> impl Iterator<Item = Pair> + 'a {
-    let planes = model.bodies.iter().enumerate().filter(|(_, b)| matches!(b.description.kind, Kind::HalfSpace(_)));
-    planes.flat_map(move |(plane, _)| {
-        let allowed = move |v: &&u32| filter.allows(model.vertex_body[**v as usize] as usize, plane);
-        model
-            .contact_vertices
-            .iter()
-            .filter(allowed)
-            .map(move |v| Pair { kind: PairKind::VertexHalfSpace, features: [*v, plane as u32] })
-    })
+/// The bodies that are half-spaces.
+pub(super) fn half_spaces(model: &Model) -> impl Iterator<Item = usize> + '_ {
+    (0..model.bodies.len()).filter(|b| matches!(model.bodies[*b].description.kind, Kind::HalfSpace(_)))
+}
+
+/// Contact vertex number `i` and a half-space, if the filter allows it.
+#[inline]
+pub(super) fn half_space_pair(model: &Model, filter: &BodyFilter, i: usize, plane: usize) -> Option<Pair> {
+    let v = model.contact_vertices[i];
+    let allowed = filter.allows(model.vertex_body[v as usize] as usize, plane);
+    allowed.then_some(Pair { kind: PairKind::VertexHalfSpace, features: [v, plane as u32] })
+}
+
+fn near_half_space(
+    model: &Model,
+    passing: &Passing,
+    pair: Pair,
+    start: &State,
+    end: &State,
+    factor: f64,
+) -> Option<Contact> {
+    if passing.touches(&pair.features[..1]) {
+        return None;
+    }
+    let [body, plane] = pair.bodies(model);
+    let thickness = model.bodies[body].half_thickness + model.bodies[plane].half_thickness;
+    let x0 = start.positions[pair.features[0] as usize];
+    let contact = half_space_contact(pair, &start.half_spaces[plane], &end.half_spaces[plane], x0, thickness);
+    (contact.start_gap < factor * thickness).then_some(contact)
 }
 
 fn near_mesh_pair(model: &Model, passing: &Passing, pair: Pair, x: &[Vec3], factor: f64) -> Option<Contact> {

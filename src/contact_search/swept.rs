@@ -2,7 +2,7 @@
 
 use super::candidates::{half_thicknesses, primitives};
 use super::contact::{Contact, half_space_contact, mesh_contact};
-use super::near::{candidate, half_space_pairs};
+use super::near::{candidate, half_space_pair, half_spaces};
 use super::pair::{BodyFilter, Pair, PairKind, gather};
 use super::passing::Passing;
 use crate::detection::ccd::{self, Separation};
@@ -53,11 +53,13 @@ pub fn swept_hits(
 ) -> Vec<Hit> {
     let (x0, x1) = (&start.positions[..], &end.positions[..]);
     let open = screening::approaching(x0, x1, &primitives(model), candidates, &half_thicknesses(model, 1.0), par);
-    let found =
-        par.map_indexed(open.len(), |i| question(model, passing, candidate(candidates, open[i] as usize), x0, x1));
-    let questions: Vec<Question> = found.into_iter().flatten().collect();
+    let ask = |i: usize| question(model, passing, candidate(candidates, open[i] as usize), x0, x1);
+    let questions = par.filter_indexed(open.len(), ask);
     let mut hits = mesh_hits(model, &questions, x0, x1, par);
-    hits.extend(half_space_pairs(model, filter).filter_map(|pair| half_space_hit(model, passing, pair, start, end)));
+    for plane in half_spaces(model) {
+        let hit = |i: usize| half_space_hit(model, passing, half_space_pair(model, filter, i, plane)?, start, end);
+        hits.extend(par.filter_indexed(model.contact_vertices.len(), hit));
+    }
     hits
 }
 

@@ -178,10 +178,10 @@ impl BroadPhase {
         let mut found = Vec::new();
         merge(vertex_face, self.boxes.len(), &mut found, par);
         found.retain(|[v, f]| woken[*v as usize] || any(&self.faces[*f as usize]));
-        unite(&mut out.vertex_face, &found);
+        unite(&mut out.vertex_face, &mut found);
         merge(edge_edge, self.edges.len(), &mut found, par);
         found.retain(|[a, b]| edge(*a) || edge(*b));
-        unite(&mut out.edge_edge, &found);
+        unite(&mut out.edge_edge, &mut found);
     }
 
     /// Edge-face pairs whose boxes overlap, that share no vertex, and that the filter lets pass; sorted.
