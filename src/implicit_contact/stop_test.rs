@@ -77,15 +77,17 @@ impl StopTest {
         // What the ratio hides is looked at again some time.
         self.ratio *= 0.9;
         if passed && self.ratio * residuals.dynamics <= tolerance {
-            let error = velocity_error(task, now, residuals, tolerance, buffers, work);
-            if error <= tolerance {
-                best.clone_from(now);
-                if balanced(task, best, buffers, work) {
-                    return Verdict::Converged(error);
-                }
+            // The cheaper question first: rows that do not hold with momentum balanced take more iterations anyway.
+            best.clone_from(now);
+            if !balanced(task, best, buffers, work) {
                 best.clone_from(now);
                 return Verdict::Continue;
             }
+            let error = velocity_error(task, now, residuals, tolerance, buffers, work);
+            if error <= tolerance {
+                return Verdict::Converged(error);
+            }
+            best.clone_from(now);
             self.ratio = error / residuals.dynamics.max(f64::MIN_POSITIVE);
         }
         Verdict::Continue
