@@ -14,8 +14,7 @@ use signorini::model::{Ablation, Settings, SolverChoice, StepReport};
 use signorini::parallel::Par;
 use std::io::Write;
 use support::boxes::BOX_VERTICES;
-use support::clock::thread_seconds;
-use support::host::Host;
+use support::host::{Host, quantile};
 use support::scenes;
 
 fn main() {
@@ -47,26 +46,6 @@ impl Table {
     }
 }
 
-/// A step from the host's present state with other settings; the host stays where it is. Processor seconds and report.
-fn step_of_a_copy(host: &mut Host, settings: &Settings) -> Option<(f64, StepReport)> {
-    host.prepare();
-    let (mut state, mut memory) = (host.state.clone(), host.memory.clone());
-    let clock = thread_seconds();
-    let (result, scratch) = (&mut host.result, &mut host.scratch);
-    let report = signorini::implicit_contact::advance(
-        &host.model,
-        &mut state,
-        &host.drives,
-        &mut memory,
-        settings,
-        host.dt,
-        result,
-        scratch,
-        Par::Serial,
-    );
-    Some((thread_seconds() - clock, report.ok()?))
-}
-
 fn anticipation(out: &str, number: &dyn Fn(&str, f64) -> f64) {
     let whole = |name: &str, otherwise: f64| number(name, otherwise) as usize;
     let (every, contacts_max) = (whole("every", 10.0), number("contacts", 6000.0) as u32);
@@ -90,7 +69,8 @@ fn anticipation(out: &str, number: &dyn Fn(&str, f64) -> f64) {
     for step in 0..whole("steps", 120.0) {
         if step % every == every - 1 && last > 0 && last <= contacts_max {
             let settings = with(SolverChoice::FullAnticipation, &host.settings);
-            if let Some((seconds, report)) = step_of_a_copy(&mut host, &settings) {
+            host.prepare();
+            if let Ok((seconds, report)) = host.step_of_a_copy(&settings, Par::Serial) {
                 table.row(&line(step, host.dt, "full", seconds, &report));
             }
         }
@@ -160,9 +140,6 @@ fn measured(host: &mut Host, steps: usize) -> String {
     let count = |f: &dyn Fn(&StepReport) -> bool| reports.iter().filter(|r| f(r)).count();
     let share = |sum: f64| sum / touching.len().max(1) as f64;
     let within = touching.iter().filter(|r| r.rounds.div_ceil(r.parts.max(1)) <= 3).count();
-    seconds.sort_unstable_by(f64::total_cmp);
-    let quantile =
-        |q: f64| seconds.get((q * (seconds.len() as f64 - 1.0)).round() as usize).copied().unwrap_or(f64::NAN);
     format!(
         "{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
         reports.len(),
@@ -173,8 +150,8 @@ fn measured(host: &mut Host, steps: usize) -> String {
         count(&|r| r.zones() + r.held_vertices > 0),
         count(&|r| r.not_converged),
         count(&|r| r.intersections.unwrap_or(0) > 0),
-        quantile(0.5),
-        quantile(0.95),
+        quantile(&mut seconds, 0.5),
+        quantile(&mut seconds, 0.95),
         reports.iter().map(|r| r.contacts).max().unwrap_or(0),
         gaps / pushing.max(1) as f64,
         least,

@@ -13,7 +13,7 @@ mod support;
 use signorini::math::{Vec3, sub};
 use signorini::model::Settings;
 use signorini::parallel::{Par, Pool};
-use support::host::{Facts, Host};
+use support::host::{Facts, Host, quantile};
 use support::scenes;
 
 struct Choice {
@@ -129,19 +129,7 @@ fn velocity_error(host: &mut Host, par: Par) -> Option<f64> {
         ..host.settings
     };
     for (settings, end) in [host.settings, tight].iter().zip(&mut ends) {
-        let (mut state, mut memory) = (host.state.clone(), host.memory.clone());
-        signorini::implicit_contact::advance(
-            &host.model,
-            &mut state,
-            &host.drives,
-            &mut memory,
-            settings,
-            host.dt,
-            &mut host.result,
-            &mut host.scratch,
-            par,
-        )
-        .ok()?;
+        host.step_of_a_copy(settings, par).ok()?;
         *end = host.result.velocities.clone();
     }
     let distance = |a: &[Vec3], b: &[Vec3]| {
@@ -184,12 +172,6 @@ fn trace(number: usize, f: &Facts) {
         r.recovery_work,
         r.intersections,
     );
-}
-
-/// Value at a fraction of the sorted list.
-fn quantile(values: &mut [f64], fraction: f64) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get((fraction * (values.len() as f64 - 1.0)).round() as usize).copied().unwrap_or(f64::NAN)
 }
 
 fn summary(name: &str, all: &[Facts], errors: &mut [f64]) {

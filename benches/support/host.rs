@@ -185,6 +185,12 @@ impl Plan {
     }
 }
 
+/// Value at a fraction of the list, which it sorts; not a number where there is none.
+pub fn quantile(values: &mut [f64], fraction: f64) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get((fraction * (values.len() as f64 - 1.0)).round() as usize).copied().unwrap_or(f64::NAN)
+}
+
 impl Host {
     /// Number of elastic vertices.
     pub fn elastic_count(&self) -> usize {
@@ -232,6 +238,25 @@ impl Host {
         let seconds = thread_seconds() - prepared;
         self.velocities.clone_from(&self.result.end_velocities);
         Ok(self.facts(&linear, report, seconds, prepared - start))
+    }
+
+    /// The prepared step from the present state with other settings, into `result`; the host stays where it is.
+    /// Processor seconds and report.
+    pub fn step_of_a_copy(&mut self, settings: &Settings, par: Par) -> Result<(f64, StepReport), StepError> {
+        let (mut state, mut memory) = (self.state.clone(), self.memory.clone());
+        let clock = thread_seconds();
+        let report = advance(
+            &self.model,
+            &mut state,
+            &self.drives,
+            &mut memory,
+            settings,
+            self.dt,
+            &mut self.result,
+            &mut self.scratch,
+            par,
+        )?;
+        Ok((thread_seconds() - clock, report))
     }
 
     /// `|v|_A^2 / 2` over all free blocks.

@@ -1,5 +1,6 @@
 //! Co-rotational linear tetrahedra [Mueller04].
 
+use super::damping::excess_stretch;
 use super::side_by_side::{LANES, SideBySide};
 use super::stencil::{Blocks, HessianForm, Stencil, zero_blocks};
 use crate::math::simd::points::Point;
@@ -136,6 +137,7 @@ impl Stencil<4> for CorotationalTetrahedron {
     fn viscosity(&self, x: &[Vec3; 4]) -> Blocks<4> {
         let f = self.gradient(x);
         let spread = mat_mul(&f, &transpose(&f));
+        let volume = self.volume / excess_stretch((0..3).map(|k| spread[k][k]).sum(), 3.0);
         let carried = self.gradients.map(|b| mat_vec(&f, b));
         let mut blocks = zero_blocks::<4>();
         for i in 0..4 {
@@ -143,7 +145,7 @@ impl Stencil<4> for CorotationalTetrahedron {
                 let along = mat_scale(self.mu * dot(self.gradients[i], self.gradients[j]), &spread);
                 let crossed = outer(scale(self.mu, carried[j]), carried[i]);
                 let dilation = outer(scale(self.lambda, carried[i]), carried[j]);
-                blocks[i][j] = mat_scale(self.volume, &mat_add(&mat_add(&along, &crossed), &dilation));
+                blocks[i][j] = mat_scale(volume, &mat_add(&mat_add(&along, &crossed), &dilation));
             }
         }
         blocks

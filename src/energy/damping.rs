@@ -15,6 +15,15 @@ pub struct Damping {
     pub bending_time: f64,
 }
 
+/// Mean squared stretch up to which V is that of Green's strain, whose rate grows with the square of the stretch: faces
+/// stretched forty times would come back only within 800 tau. Beyond, V is divided by what it exceeds this by.
+pub(super) const GREEN_STRETCH_SQUARED: f64 = 4.0;
+
+/// What V is divided by where the squares of the `count` stretches sum to `squares`: 1 in ordinary deformation.
+pub(super) fn excess_stretch(squares: f64, count: f64) -> f64 {
+    (squares / (GREEN_STRETCH_SQUARED * count)).max(1.0)
+}
+
 impl Damping {
     /// The first of the three that is negative or not finite.
     pub fn fault(&self) -> Option<f64> {

@@ -1,5 +1,6 @@
 //! Constant-strain triangles in their plane: membranes of cloth and shells.
 
+use super::damping::excess_stretch;
 use super::side_by_side::{LANES, SideBySide};
 use super::stencil::{Blocks, HessianForm, Stencil, zero_blocks};
 use crate::math::simd::points::Point;
@@ -161,9 +162,10 @@ impl Stencil<3> for TriangleMembrane {
         super::wide_shell::membranes(four, x, (stiff, viscous))
     }
 
-    /// Kelvin-Voigt: the elastic tensor on the rate of Green's strain, `sym(F^T dF/dt)`.
+    /// Kelvin-Voigt: the elastic tensor on the rate of Green's strain, `sym(F^T dF/dt)`, bounded in large stretch.
     fn viscosity(&self, x: &[Vec3; 3]) -> Blocks<3> {
         let f = self.gradient(x);
+        let volume = self.volume / excess_stretch(norm_squared(f[0]) + norm_squared(f[1]), 2.0);
         let spread: Mat3 = mat_add(&outer(f[0], f[0]), &outer(f[1], f[1]));
         let carried = self.gradients.map(|b| combine(&f, b));
         let mut blocks = zero_blocks::<3>();
@@ -172,7 +174,7 @@ impl Stencil<3> for TriangleMembrane {
                 let along = mat_scale(self.mu * dot2(self.gradients[i], self.gradients[j]), &spread);
                 let crossed = outer(scale(self.mu, carried[j]), carried[i]);
                 let dilation = outer(scale(self.lambda, carried[i]), carried[j]);
-                blocks[i][j] = mat_scale(self.volume, &mat_add(&mat_add(&along, &crossed), &dilation));
+                blocks[i][j] = mat_scale(volume, &mat_add(&mat_add(&along, &crossed), &dilation));
             }
         }
         blocks

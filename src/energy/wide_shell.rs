@@ -1,5 +1,6 @@
 //! Four membranes or four hinges at a time, as `triangle_membrane` and `discrete_shell` have them element by element.
 
+use super::damping::GREEN_STRETCH_SQUARED;
 use super::side_by_side::{
     LANES, Number, SideBySide, Vector, ZERO, across, add_outer, diagonal, gather, projected, unit_or,
 };
@@ -44,6 +45,8 @@ pub(super) fn membranes(
     let out_of_plane = sigma.map(|s| projected(soft, s, two_mu));
     let carried = b.map(|b| combine(&b));
     let (stiff, viscous_volume) = (volume * Lanes::splat(stiff), volume * Lanes::splat(viscous));
+    let squares = (dot(&f[0], &f[0]) + dot(&f[1], &f[1])) * Lanes::splat(0.5 / GREEN_STRETCH_SQUARED);
+    let viscous_volume = viscous_volume / squares.max(Lanes::splat(1.0));
     let mut out = SideBySide::EMPTY;
     for i in 0..2 {
         let stress = add(&scale(two_mu, &carried[i]), &scale(pressure, &turned[i]));

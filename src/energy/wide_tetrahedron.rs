@@ -2,6 +2,7 @@
 //! has it element by element.
 
 use super::CorotationalTetrahedron;
+use super::damping::GREEN_STRETCH_SQUARED;
 use super::side_by_side::{
     Block, LANES, SideBySide, Vector, ZERO, across, add_outer, diagonal, gather, projected, unit_or,
 };
@@ -56,6 +57,8 @@ pub(super) fn evaluate(
     let mut out = SideBySide::EMPTY;
     let (stiff, viscous_volume) = (volume * Lanes::splat(stiff), volume * Lanes::splat(viscous));
     let spread: Block = [0, 1, 2].map(|r| [0, 1, 2].map(|c| dot(&f[r], &f[c])));
+    let squares = (spread[0][0] + spread[1][1] + spread[2][2]) * Lanes::splat(1.0 / (3.0 * GREEN_STRETCH_SQUARED));
+    let viscous_volume = viscous_volume / squares.max(Lanes::splat(1.0));
     for i in 0..3 {
         let stress = add(&scale(two_mu, &carried[i]), &scale(pressure, &turned[i]));
         out.forces[i + 1] = scale(volume.negate(), &stress);

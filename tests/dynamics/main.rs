@@ -3,6 +3,7 @@
 
 mod closed_forms;
 mod contact;
+mod free_flight;
 mod local_response;
 #[allow(dead_code)]
 #[path = "../../benches/support/random.rs"]
