@@ -261,6 +261,7 @@ impl SgnStepDesc {
             restitution: self.restitution,
             repulsion_stiffness: self.repulsion_stiffness,
             passes_max: self.passes_max,
+            two_pass: false,
         };
         Ok(Settings {
             method,

@@ -228,6 +228,9 @@ pub struct BodyFilter {
     masks: Vec<u64>,
     collides_with_itself: Vec<bool>,
     immovable: Vec<bool>,
+    /// Which bodies are scripted, where only pairs with or without these are allowed.
+    scripts: Vec<bool>,
+    only: Option<bool>,
     fingerprint: u64,
 }
 
@@ -244,9 +247,19 @@ impl BodyFilter {
                 .map(|b| b.description.self_collision && matches!(b.description.kind, Kind::Deformable { .. }))
                 .collect(),
             immovable: model.bodies.iter().map(is_immovable).collect(),
+            scripts: Vec::new(),
+            only: None,
             fingerprint: 0,
         }
         .with_fingerprint(model)
+    }
+
+    /// This filter on pairs with something scripted alone (kinematic bodies, half-spaces), or on all others alone.
+    pub fn of_pairs(&self, model: &Model, scripted: bool) -> BodyFilter {
+        let is_script = |b: &Body| matches!(b.description.kind, Kind::Kinematic { .. } | Kind::HalfSpace(_));
+        let mut only = BodyFilter { only: Some(scripted), ..self.clone() };
+        only.scripts = model.bodies.iter().map(is_script).collect();
+        only.with_fingerprint(model)
     }
 
     /// A number that changes with anything here, with the bodies' vertex ranges or with their thickness: what was found
@@ -260,7 +273,8 @@ impl BodyFilter {
         // FNV-1a over words.
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         for (i, body) in model.bodies.iter().enumerate() {
-            let flags = u64::from(self.collides_with_itself[i]) | u64::from(self.immovable[i]) << 1;
+            let only = self.only.map_or(0, |scripted| 1 + u64::from(scripted));
+            let flags = u64::from(self.collides_with_itself[i]) | u64::from(self.immovable[i]) << 1 | only << 2;
             let words = [self.groups[i], self.masks[i], flags, body.vertices.end as u64, body.half_thickness.to_bits()];
             words.iter().for_each(|word| hash = (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3));
         }
@@ -272,7 +286,10 @@ impl BodyFilter {
     #[inline]
     pub fn allows(&self, a: usize, b: usize) -> bool {
         if a == b {
-            return self.collides_with_itself[a];
+            return self.collides_with_itself[a] && self.only != Some(true);
+        }
+        if self.only.is_some_and(|scripted| scripted != (self.scripts[a] || self.scripts[b])) {
+            return false;
         }
         self.groups[a] & self.masks[b] != 0
             && self.groups[b] & self.masks[a] != 0

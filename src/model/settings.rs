@@ -108,11 +108,14 @@ pub struct FilterSettings {
     pub repulsion_stiffness: f64,
     /// Passes of impulses and continuous detection before the fail-safes.
     pub passes_max: u32,
+    /// Whether collisions with scripts are answered first, zones included, and all others after that, as [Harmon10, §3.8]
+    /// tried. A baseline that fails: what it leaves is held or pinched, since nothing passes here.
+    pub two_pass: bool,
 }
 
 impl Default for FilterSettings {
     fn default() -> Self {
-        FilterSettings { restitution: 0.0, repulsion_stiffness: 10.0, passes_max: 10 }
+        FilterSettings { restitution: 0.0, repulsion_stiffness: 10.0, passes_max: 10, two_pass: false }
     }
 }
 

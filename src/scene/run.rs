@@ -26,6 +26,8 @@ pub struct Options {
     pub method: Option<String>,
     /// Fail-safe in place of the scene's: `unilateral_projection`, `inelastic_projection` or `rigid_zone`.
     pub fail_safe: Option<String>,
+    /// Two passes of the filter, whatever the scene says.
+    pub two_pass: bool,
     /// Friction coefficient of every body in place of the scene's.
     pub friction: Option<f64>,
     /// Step to stop at; `None`: the end of the scene.
@@ -45,7 +47,7 @@ pub struct Options {
 impl Options {
     /// Whether the scene runs as it is written.
     fn as_written(&self) -> bool {
-        self.method.is_none() && self.fail_safe.is_none() && self.friction.is_none()
+        self.method.is_none() && self.fail_safe.is_none() && self.friction.is_none() && !self.two_pass
     }
 }
 
@@ -131,6 +133,9 @@ fn choose(options: &Options, file: &mut SceneFile) -> Result<(), Failure> {
     if let Some(name) = &options.fail_safe {
         file.settings.fail_safe = Some(named(name, "fail-safe")?);
     }
+    if options.two_pass {
+        file.settings.two_pass = Some(true);
+    }
     if let Some(friction) = options.friction {
         not_negative(friction, "", "friction")
             .map_err(|fault| Failure::Usage(format!("friction: {}", fault.message)))?;
@@ -143,6 +148,7 @@ fn choose(options: &Options, file: &mut SceneFile) -> Result<(), Failure> {
 fn run_key(text: &str, options: &Options) -> u64 {
     // FNV-1a; not for adversaries.
     let chosen = format!("{:?}{:?}{:?}", options.method, options.fail_safe, options.friction);
+    let chosen = if options.two_pass { chosen + "TwoPass" } else { chosen };
     let bytes = text.bytes().chain(chosen.bytes()).chain(options.jitter.to_le_bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }

@@ -27,6 +27,7 @@ pub struct SettingsTable {
     pub restitution: Option<f64>,
     pub repulsion_stiffness: Option<f64>,
     pub passes_max: Option<u32>,
+    pub two_pass: Option<bool>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -117,6 +118,7 @@ impl SettingsTable {
             restitution: self.restitution.unwrap_or(d.filter.restitution),
             repulsion_stiffness: self.repulsion_stiffness.unwrap_or(d.filter.repulsion_stiffness),
             passes_max: self.passes_max.unwrap_or(d.filter.passes_max),
+            two_pass: self.two_pass.unwrap_or(d.filter.two_pass),
         };
         Settings {
             method,

@@ -3,7 +3,7 @@
 use super::part::PartEnd;
 use super::parts::Surroundings;
 use crate::contact_search::{CandidateSearch, Hit, Passing};
-use crate::fail_safe::{Nodes, Sweep, ZoneResponse, certified_share, hold, resolve_zones};
+use crate::fail_safe::{Nodes, Sweep, ZoneOutcome, ZoneResponse, certified_share, hold, resolve_zones};
 use crate::math::{Vec3, add, mat_vec, sub};
 use crate::model::{Body, Kind, Model, Segment, State, Witness};
 
@@ -33,12 +33,13 @@ pub(super) enum FallBack {
     },
 }
 
-/// Zones, projected or rigid, then hold, then the last certified share.
+/// Zones, projected or rigid, unless the method has had its own; then hold, then the last certified share.
 pub(super) fn fall_back(
     around: &Surroundings,
     segment: &Segment,
     passing: &Passing,
     part: PartEnd,
+    has_zones: bool,
     candidates: &mut CandidateSearch,
 ) -> FallBack {
     let sweep = Sweep {
@@ -50,7 +51,12 @@ pub(super) fn fall_back(
     };
     let (metric, settings) = (around.metric, around.settings);
     let response = ZoneResponse { fail_safe: settings.fail_safe, friction: settings.zone_friction };
-    let zones = resolve_zones(&sweep, metric, &part.velocities, &part.hits, candidates, &response);
+    let zones = if has_zones {
+        resolve_zones(&sweep, metric, &part.velocities, &part.hits, candidates, &response)
+    } else {
+        let (velocities, hits) = (part.velocities.clone(), part.hits.clone());
+        ZoneOutcome { velocities, hits, ..ZoneOutcome::default() }
+    };
     let (projected, rigid) = (zones.projected, zones.rigid);
     if zones.hits.is_empty() {
         let momentum_taken = momentum_lost(segment.model, around, &part.velocities, &zones.velocities);
@@ -75,7 +81,7 @@ pub(super) fn fall_back(
 
 /// Linear momentum that movable blocks lose from `old` to `new` velocities, lumped `[N s]`: free zones keep theirs, held
 /// nodes and zones with scripted members do not.
-fn momentum_lost(model: &Model, around: &Surroundings, old: &[Vec3], new: &[Vec3]) -> Vec3 {
+pub fn momentum_lost(model: &Model, around: &Surroundings, old: &[Vec3], new: &[Vec3]) -> Vec3 {
     let angular = |body: &Body| matches!(body.description.kind, Kind::Rigid { .. });
     let linear = model.bodies.iter().flat_map(|b| b.blocks.clone().take(if angular(b) { 1 } else { usize::MAX }));
     linear

@@ -22,6 +22,7 @@ pub use account::{StepAccount, lap};
 pub use carried::{Carried, Certified, start_state};
 pub use commit::{answer, commit};
 pub use driven::Driven;
+pub use fall_back::momentum_lost;
 pub use inputs::check_inputs;
 pub use part::{PartEnd, Solved, SolvedContact};
 pub use parts::{PartMethod, Surroundings, run_parts};

@@ -49,6 +49,11 @@ pub trait PartMethod {
     /// Halvings of a part that did not come clean, before the fail-safes.
     fn halvings_max(&self, settings: &Settings) -> u32;
 
+    /// Whether zones are tried on what did not come clean.
+    fn has_zones(&self, _: &Settings) -> bool {
+        true
+    }
+
     /// Takes over what the next part starts from; `by_itself` unless fail-safes made the end.
     fn keep(&mut self, model: &Model, part: &PartEnd, dt: f64, by_itself: bool);
 }
@@ -99,7 +104,7 @@ pub fn run_parts(
         }
         clock = Instant::now();
         around.watch.ask(Phase::FailSafe, part.from)?;
-        let outcome = fall_back(around, &segment, passing, end, search);
+        let outcome = fall_back(around, &segment, passing, end, method.has_zones(settings), search);
         account.report.times.fail_safe += lap(&mut clock);
         match outcome {
             FallBack::Resolved { part: end, projected, rigid, held_vertices, momentum_taken } => {

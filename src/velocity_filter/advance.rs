@@ -4,7 +4,8 @@ use super::Memory;
 use super::impulse::iterate_impulses;
 use super::motion::FilteredMotion;
 use super::repulsion::repel;
-use crate::contact_search::{BodyFilter, CandidateSearch, Passing, near_contacts};
+use super::two_pass::filter_in_two_passes;
+use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing, near_contacts};
 use crate::model::{Drives, Model, Phase, Segment, Settings, State, StepError, StepReport, StepResult, Watch};
 use crate::parallel::Par;
 use crate::step::{
@@ -93,21 +94,11 @@ impl PartMethod for Filter {
         search: &mut CandidateSearch,
         report: &mut StepReport,
     ) -> Result<PartEnd, StepError> {
-        let settings = around.settings;
-        let mut clock = Instant::now();
+        if around.settings.filter.two_pass {
+            return filter_in_two_passes(around, segment, passing, search, report);
+        }
         let mut motion = FilteredMotion::new(segment, around.metric);
-        // (3) Repulsions.
-        let (start, par) = (segment.start, around.par);
-        let factor = settings.proximity_factor.max(1.0);
-        let x1 = &motion.end.positions;
-        let candidates = search.update(segment.model, around.filter, &start.positions, x1, factor, par);
-        let near = near_contacts(segment.model, around.filter, passing, candidates, start, &motion.end, 1.0, par);
-        report.times.search += lap(&mut clock);
-        let stiffness = settings.filter.repulsion_stiffness;
-        repel(&mut motion, &near, stiffness, settings.recovery_fraction, (around.metric, segment.dt, par));
-        report.times.solve += lap(&mut clock);
-        // (4) Impulses.
-        let hits = iterate_impulses(around, segment, passing, &mut motion, search, report)?;
+        let hits = filter_once(around, segment, passing, &mut motion, search, report)?;
         Ok(motion.into_part(hits))
     }
 
@@ -115,5 +106,34 @@ impl PartMethod for Filter {
         0
     }
 
+    fn has_zones(&self, settings: &Settings) -> bool {
+        !settings.filter.two_pass
+    }
+
     fn keep(&mut self, _: &Model, _: &PartEnd, _: f64, _: bool) {}
+}
+
+/// Stages 3 and 4 on the pairs that the filter of the surroundings allows; what still collides. Errors: cancelled.
+pub(super) fn filter_once(
+    around: &Surroundings,
+    segment: &Segment,
+    passing: &Passing,
+    motion: &mut FilteredMotion,
+    search: &mut CandidateSearch,
+    report: &mut StepReport,
+) -> Result<Vec<Hit>, StepError> {
+    let settings = around.settings;
+    let mut clock = Instant::now();
+    // (3) Repulsions.
+    let (start, par) = (segment.start, around.par);
+    let factor = settings.proximity_factor.max(1.0);
+    let x1 = &motion.end.positions;
+    let candidates = search.update(segment.model, around.filter, &start.positions, x1, factor, par);
+    let near = near_contacts(segment.model, around.filter, passing, candidates, start, &motion.end, 1.0, par);
+    report.times.search += lap(&mut clock);
+    let stiffness = settings.filter.repulsion_stiffness;
+    repel(motion, &near, stiffness, settings.recovery_fraction, (around.metric, segment.dt, par));
+    report.times.solve += lap(&mut clock);
+    // (4) Impulses.
+    iterate_impulses(around, segment, passing, motion, search, report)
 }

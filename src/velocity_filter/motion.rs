@@ -4,7 +4,7 @@ use super::row_response::inverse_mass;
 use super::stage_rows::StageRows;
 use crate::constraint::{BuiltRows, Linearisation, Metric, build_rows};
 use crate::contact_search::{Contact, Hit};
-use crate::math::{Vec3, add, mat_vec};
+use crate::math::{Vec3, add, mat_vec, sub};
 use crate::model::{Precision, Segment, State};
 use crate::step::{PartEnd, Solved, SolvedContact};
 
@@ -75,6 +75,18 @@ impl<'a> FilteredMotion<'a> {
             self.follow();
         }
         pushed
+    }
+
+    /// Takes over velocities that a fail-safe found, as impulses over lumped masses.
+    pub fn replace(&mut self, velocities: &[Vec3]) {
+        for (block, (new, old)) in velocities.iter().zip(&self.velocities).enumerate() {
+            if !self.metric.fixed[block] && new != old {
+                let f = mat_vec(&self.metric.lumped[block], sub(*new, *old));
+                self.lumped[block] = add(self.lumped[block], f);
+                self.impulses[block] = add(self.impulses[block], f);
+            }
+        }
+        self.follow();
     }
 
     /// The end of the part, with what still collides.

@@ -32,6 +32,17 @@ fn friction_slows_the_ribbon_and_holds_it() {
     assert!(ways.is_sorted_by(|a, b| *a > 1.1 * b), "{ways:?}");
 }
 
+/// The baseline of [Harmon10, §3.8] that answers scripts before all others: what its second pass pushes back into scripts is held, and
+/// nothing passes.
+#[test]
+fn two_passes_hold_what_one_answers() {
+    let folder = Folder::new("two-pass");
+    let options = ["--steps", "60"];
+    let [once, twice] = [&options[..], &["--steps", "60", "--two-pass"]]
+        .map(|options| travel(&run(&folder, "squares_incline", options)));
+    assert!(twice < 0.1 * once, "{once} {twice}");
+}
+
 /// [Harmon10, Fig. 3.6]: cloth that a ball shoves into a funnel slides in and is not stretched; springs
 /// that knew of masses alone left 2 J in it by then.
 #[test]
