@@ -56,11 +56,12 @@ impl CandidateSearch {
         par: Par,
     ) -> &Candidates {
         if let Some(anchor) = self.anchor.as_mut().filter(|anchor| anchor.is_for(model, filter, factor, x0.len())) {
-            let outside = anchor.outside(model, x0, x1, factor);
-            let count = outside.iter().filter(|left| **left).count();
+            let leaves = |v: usize| anchor.is_left(v, model, x0[v], x1[v], factor);
+            let count = par.sum(x0.len(), |v| f64::from(u8::from(leaves(v)))) as usize;
             if count == 0 {
                 return &self.candidates;
             }
+            let outside = par.map_indexed(x0.len(), leaves);
             let pairs = self.candidates.vertex_face.len() + self.candidates.edge_edge.len();
             let grown = pairs > anchor.pairs + anchor.pairs / 4;
             let finite = (0..x0.len()).all(|v| !outside[v] || (is_finite(x0[v]) && is_finite(x1[v])));
@@ -128,16 +129,13 @@ impl Anchor {
             && self.boxes.len() == vertices
     }
 
-    /// Which vertices leave their box: at `x0` with `factor`, on their way with half of one to spare.
-    fn outside(&self, model: &Model, x0: &[Vec3], x1: &[Vec3], factor: f64) -> Vec<bool> {
-        let leaves = |(v, searched): (usize, &Aabb)| {
-            let half_thickness = model.bodies[model.vertex_body[v] as usize].half_thickness;
-            let near = Aabb::swept(x0[v], x0[v], factor * half_thickness);
-            let way = Aabb::swept(x0[v], x1[v], SWEPT_REACH * half_thickness);
-            // The box of a number that is none would be that of the other end.
-            !(is_finite(x0[v]) && is_finite(x1[v]) && searched.contains(&near.union(&way)))
-        };
-        self.boxes.iter().enumerate().map(leaves).collect()
+    /// Whether a vertex leaves its box: at `x0` with `factor`, on its way with half of one to spare.
+    fn is_left(&self, v: usize, model: &Model, x0: Vec3, x1: Vec3, factor: f64) -> bool {
+        let half_thickness = model.bodies[model.vertex_body[v] as usize].half_thickness;
+        let near = Aabb::swept(x0, x0, factor * half_thickness);
+        let way = Aabb::swept(x0, x1, SWEPT_REACH * half_thickness);
+        // The box of a number that is none would be that of the other end.
+        !(is_finite(x0) && is_finite(x1) && self.boxes[v].contains(&near.union(&way)))
     }
 }
 

@@ -14,6 +14,9 @@ use std::sync::atomic::{AtomicU8, Ordering};
 /// strictly nearer to `p`: then the point slides off the border into the face, which has its own row. A vertex that is
 /// nearest to an edge or a corner keeps that row. Of two vertices both must have something nearer. Cost: linear.
 pub(super) fn distinct(contacts: &mut Vec<Contact>, par: Par) {
+    if contacts.is_empty() {
+        return;
+    }
     let mut kept = vec![true; contacts.len()];
     let mut borders = Borders::for_contacts(contacts.len());
     for i in 0..contacts.len() {

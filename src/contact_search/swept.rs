@@ -128,6 +128,9 @@ fn question(model: &Model, passing: &Passing, pair: Pair, x0: &[Vec3], x1: &[Vec
 
 /// The questions, vertex-face pairs first, that continuous detection answers with a hit.
 fn mesh_hits(model: &Model, questions: &[Question], x0: &[Vec3], x1: &[Vec3], par: Par) -> Vec<Hit> {
+    if questions.is_empty() {
+        return Vec::new();
+    }
     let (vertex_face, edge_edge) =
         questions.split_at(questions.partition_point(|q| q.pair.kind == PairKind::VertexFace));
     let features = |list: &[Question]| list.iter().map(|q| q.pair.features).collect();

@@ -50,6 +50,9 @@ const COARSE_SHARE: f64 = 0.01;
 pub fn near(x: &[Vec3], primitives: &Primitives, candidates: &Candidates, reach: &[f64], par: Par) -> Vec<u32> {
     let lists = Lists { primitives, candidates };
     let mut open = lists.all();
+    if open.is_empty() {
+        return open;
+    }
     let coarse = Coarse::new(x, None, reach, par);
     lists.rule_out::<COARSE_WIDTH, _>(&coarse, &mut open, par);
     let smallest = reach.iter().fold(f64::INFINITY, |a, b| a.min(*b));
@@ -71,6 +74,9 @@ pub fn approaching(
 ) -> Vec<u32> {
     let lists = Lists { primitives, candidates };
     let mut open = lists.all();
+    if open.is_empty() {
+        return open;
+    }
     lists.rule_out::<COARSE_WIDTH, _>(&Coarse::new(x0, Some(x1), half_thickness, par), &mut open, par);
     lists.rule_out::<WIDTH, _>(&Fine { x0, x1: Some(x1), reach: half_thickness }, &mut open, par);
     open

@@ -215,7 +215,7 @@ fn a_resting_step_allocates_a_bounded_number_of_times() {
 }
 
 /// Calls of the allocator that a resting step may make.
-const RESTING: u64 = 150;
+const RESTING: u64 = 140;
 
 /// Bytes per vertex of a world, its most within steps, and what contacts add to that.
 #[test]
