@@ -228,14 +228,14 @@ impl<'a> Springs<'a> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::constraint::BuiltRows;
     use crate::linalg::BlockMatrix;
     use crate::math::{norm, scale};
 
     /// A chain of equal masses on springs.
-    fn chain(n: usize, mass: f64, stiffness: f64) -> Metric {
+    pub fn chain(n: usize, mass: f64, stiffness: f64) -> Metric {
         let places = (1..n as u32).flat_map(|i| [(i, i - 1), (i - 1, i)]).collect();
         let mut matrix = BlockMatrix::from_places(n, places);
         for i in 0..n as u32 {
@@ -259,7 +259,7 @@ mod tests {
     }
 
     /// Rows between neighbours `(block, next)` or of one block, that approach along `normal` at `speed` and slide at 0.3.
-    fn stage(metric: &Metric, contacts: &[(u32, Option<u32>, f64)], friction: f64) -> StageRows {
+    pub fn stage(metric: &Metric, contacts: &[(u32, Option<u32>, f64)], friction: f64) -> StageRows {
         let mut built = BuiltRows::default();
         let rows = &mut built.rows;
         (rows.offsets, rows.angular_offsets) = (vec![0], vec![0]);

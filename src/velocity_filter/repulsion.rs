@@ -125,3 +125,32 @@ fn rub(rows: &mut StageRows, row: usize) -> f64 {
     rows.push(row, [0.0, given[0], given[1]]);
     mobility * given[0].hypot(given[1])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::coupled_springs::tests::{chain, stage};
+    use super::*;
+
+    /// A mass of 0.5 kg at 2 m/s that was pushed back too hard: it leaves as fast as it came, or faster by the work allowed.
+    #[test]
+    fn impulses_that_have_not_settled_add_no_more_than_the_work_of_springs() {
+        let metric = chain(1, 0.5, 0.0);
+        for (separation, impulse) in [(0.0, 2.0), (0.5, 2.5)] {
+            let mut rows = stage(&metric, &[(0, None, 2.0)], 0.0);
+            rows.separations = vec![separation];
+            let before = vec![rows.velocity(0)];
+            rows.push(0, [3.0, 0.0, 0.0]);
+            bound_energy(&mut rows, &before);
+            assert!((rows.impulses[0][0] - impulse).abs() < 1e-12, "{:?}", rows.impulses);
+            let speed = -2.0 + rows.impulses[0][0] / 0.5;
+            let gained = 0.5 * 0.5 * (speed * speed - 4.0);
+            assert!((gained - impulse * separation).abs() < 1e-12, "{gained}");
+        }
+        // What keeps within the work is left as it is.
+        let mut rows = stage(&metric, &[(0, None, 2.0)], 0.0);
+        let before = vec![rows.velocity(0)];
+        rows.push(0, [1.5, 0.0, 0.0]);
+        bound_energy(&mut rows, &before);
+        assert_eq!(rows.impulses[0][0], 1.5);
+    }
+}
