@@ -30,14 +30,14 @@ const NEWTON_STEPS: u32 = 3;
 /// The same where they are factored.
 const NEWTON_STEPS_FACTORED: u32 = 12;
 /// Factored Newton steps go on until what they leave is this share of the contact tolerance.
-const FACTORED_SHARE: f64 = 1e-5;
+const FACTORED_SHARE: f64 = 3e-6;
 /// What Newton steps leave by rounding, relative to the velocity scale.
 const ROUNDING: f64 = 1e-11;
 /// Minima are good enough to judge once they leave this share of the contact tolerance.
-const SETTLED: f64 = 0.1;
+const SETTLED: f64 = 0.03;
 /// Where Newton systems are factored another update costs little: a solution goes on to this share of the contact
 /// tolerance, so that what rests leaves no velocity that the next step has to stop again.
-const POLISHED: f64 = 1e-3;
+const POLISHED: f64 = 3e-4;
 /// Updates for that at most.
 const POLISHES: u32 = 8;
 /// Updates without a better iterate after which friction limits no longer follow all of the way.
