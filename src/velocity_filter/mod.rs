@@ -7,7 +7,7 @@
 //! * `row_response`: the response of one row: normal impulse, friction
 //! * `repulsion`: weak springs between what is closer than its thickness
 //! * `coupled_springs`: the same where a matrix couples velocities
-//! * `two_pass`: the baseline of [Harmon10] that answers scripts first
+//! * `two_pass`: the baseline of [Harmon10, §3.8] that answers scripts first
 //! * `impulse`: passes of impulses and continuous detection
 //!
 //! What is left of collisions after that is a matter for the fail-safes, which all methods share.
