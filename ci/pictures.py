@@ -25,6 +25,7 @@ FLOOR = "#dcd8d0"
 SHADOW = "#b9b4ab"
 GRID = "#d0cbc2"
 GLASS = "#7d94a3"
+THREE_QUARTERS = np.array([0.75, 0.45, 1.05])
 SKY_TOP, SKY_BOTTOM = "#dfe7ee", "#f6f3ee"
 
 
@@ -111,17 +112,21 @@ def add_glass(plotter, points, faces):
         plotter.add_mesh(edges, color=GLASS, line_width=3, lighting=False)
 
 
-def add_plane(plotter, normal, offset, points, size):
-    """The part of a half-space's plane under what is drawn, a hair below it, with lines across."""
+def add_plane(plotter, normal, offset, points, size, camera):
+    """The part of a half-space's plane under what is drawn, a hair below it, with lines across; seen from behind, only those."""
     normal = np.asarray(normal)
     across = np.cross(normal, [0.0, 0.0, 1.0] if abs(normal[2]) < 0.9 else [1.0, 0.0, 0.0])
     across /= np.linalg.norm(across)
     along = np.cross(across, normal)
+    # A wall that moves is known where it ends, and stood no farther in than what is before it.
+    offset = min(offset, (points @ normal).min())
     origin = (offset - 2e-3 * size) * normal
-    (u0, u1), (v0, v1) = [(x.min() - 0.15 * size, x.max() + 0.15 * size) for x in (points @ across, points @ along)]
+    margin = lambda x: 0.1 * np.ptp(x) + 0.02 * size
+    (u0, u1), (v0, v1) = [(x.min() - margin(x), x.max() + margin(x)) for x in (points @ across, points @ along)]
     corner = lambda u, v: origin + u * across + v * along
     quad = np.array([corner(u0, v0), corner(u1, v0), corner(u1, v1), corner(u0, v1)])
-    plotter.add_mesh(surface(quad, np.array([[0, 1, 2], [0, 2, 3]])), color=FLOOR, lighting=False)
+    if camera @ normal > offset:
+        plotter.add_mesh(surface(quad, np.array([[0, 1, 2], [0, 2, 3]])), color=FLOOR, lighting=False)
     step = 10.0 ** np.floor(np.log10(size / 4.0))
     for w in np.arange(np.ceil(v0 / step), v1 / step) * step:
         plotter.add_mesh(pv.Line(corner(u0, w) + 1e-3 * size * normal, corner(u1, w) + 1e-3 * size * normal), color=SHADOW, line_width=2, lighting=False)
@@ -169,7 +174,7 @@ def draw(scene, window, camera, look_at, angle, centre, size, floor, height, pla
             if len(faces):
                 add_shadow(plotter, points, faces, ground + 5e-4 * size, directions[0])
     for plane in planes:
-        add_plane(plotter, plane[:3], plane[3], np.concatenate([points for _, points, _ in scene if len(points)]), size)
+        add_plane(plotter, plane[:3], plane[3], np.concatenate([points for _, points, _ in scene if len(points)]), size, camera)
     plotter.camera.position, plotter.camera.focal_point = camera, look_at
     plotter.camera.up = (0.0, 1.0, 0.0)
     plotter.camera.view_angle = angle
@@ -189,14 +194,31 @@ def middle_and_extent(points):
     return 0.5 * (low + high), float(np.linalg.norm(high - low))
 
 
+def camera_on(points, view, angle, aspect):
+    """Where a camera that looks against `view` stands, and a point before it, so that it sees all points, as near as that allows."""
+    view = view / np.linalg.norm(view)
+    right = np.cross([0.0, 1.0, 0.0], view)
+    right /= np.linalg.norm(right)
+    steepest, place, distance = 0.94 * np.tan(np.radians(angle / 2)), np.zeros(3), 0.0
+    for axis, slope in ((right, aspect * steepest), (np.cross(view, right), steepest)):
+        # A point is seen where |across - middle| <= slope (distance - along view).
+        high, low = (points @ (slope * view + axis)).max(), (points @ (slope * view - axis)).max()
+        place += 0.5 * (high - low) * axis
+        distance = max(distance, 0.5 * (high + low) / slope)
+    camera = place + distance * view
+    return camera, camera - view
+
+
 def sheet(scenes, out, arguments, height_of_floor, planes=(), scripted=()):
     """Draws frames beside and below each other."""
     points = np.concatenate([points for scene in scenes for _, points, _ in scene if len(points)])
     centre, size = middle_and_extent(points)
-    look_at = arguments.look_at if arguments.look_at is not None else centre
-    camera = arguments.camera if arguments.camera is not None else centre + size * np.array([0.75, 0.45, 1.05])
-
     width, height = (int(word) for word in arguments.size.split("x"))
+    angle = 30.0 / arguments.zoom
+    if arguments.camera is None:
+        camera, look_at = camera_on(points, THREE_QUARTERS, angle, width / height)
+    else:
+        camera, look_at = arguments.camera, centre if arguments.look_at is None else arguments.look_at
     columns = min(arguments.columns, len(scenes))
     rows = -(-len(scenes) // columns)
     picture = np.full((rows * height, columns * width, 3), 255, dtype=np.uint8)
@@ -205,10 +227,8 @@ def sheet(scenes, out, arguments, height_of_floor, planes=(), scripted=()):
         if arguments.follow:
             # Seen from the same side, as near as what moves freely in this frame allows.
             free = np.concatenate([points for name, points, faces in scene if len(faces) and name not in scripted])
-            middle, extent = middle_and_extent(free)
-            view = (camera - look_at) / np.linalg.norm(camera - look_at)
-            here = (middle + 1.7 * extent * view, middle, middle, extent)
-        image = draw(scene, (width, height), here[0], here[1], 30.0 / arguments.zoom, here[2], here[3], arguments.floor, height_of_floor, planes, scripted)
+            here = (*camera_on(free, camera - look_at, angle, width / height), *middle_and_extent(free))
+        image = draw(scene, (width, height), here[0], here[1], angle, here[2], here[3], arguments.floor, height_of_floor, planes, scripted)
         row, column = divmod(index, columns)
         picture[row * height : (row + 1) * height, column * width : (column + 1) * width] = image
     Image.fromarray(picture).save(out, optimize=True)
@@ -228,8 +248,6 @@ def draw_run(run, arguments):
     for name in ("camera", "look_at"):
         if report.get(name) is not None and getattr(arguments, name) is None:
             setattr(arguments, name, up(report[name]))
-            arguments.zoom = arguments.zoom or 1.0
-    arguments.zoom = arguments.zoom or 0.8
     arguments.floor = report["floor"] is not None
     planes = [[*up(plane[:3]), plane[3]] for plane in report.get("planes", [])]
     # The floor is drawn as such.
@@ -285,14 +303,13 @@ def main():
     parser.add_argument("--size", default="640x480", help="of one picture, in pixels")
     parser.add_argument("--camera", type=vector, help="where the camera stands; default: a three-quarter view of all")
     parser.add_argument("--look-at", type=vector)
-    parser.add_argument("--zoom", type=float, help="default: 1, and 0.8 for a run whose scene has no camera")
+    parser.add_argument("--zoom", type=float, default=1.0)
     parser.add_argument("--follow", action="store_true", help="move the camera with what is not scripted, as near as that allows")
     parser.add_argument("--floor", action="store_true", help="draw a floor at y = 0")
     arguments = parser.parse_args()
     if arguments.out.is_dir():
         draw_run(arguments.out, arguments)
     elif arguments.frames:
-        arguments.zoom = arguments.zoom or 1.0
         sheet([read_obj(frame) for frame in arguments.frames], arguments.out, arguments, 0.0)
     else:
         parser.error("no frames given, and the first argument is not a folder")

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use signorini::scene::{Failure, Options, run};
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -95,7 +95,8 @@ fn main() -> ExitCode {
     bar.finish_and_clear();
     match outcome {
         Ok(finished) => {
-            println!("{}", if choice.json { &finished.json } else { &finished.summary });
+            // The run is done whether or not somebody still reads.
+            let _ = writeln!(std::io::stdout(), "{}", if choice.json { &finished.json } else { &finished.summary });
             for bound in &finished.broken {
                 eprintln!("bound broken: {bound}");
             }
