@@ -11,6 +11,7 @@ const USAGE: &str = "usage: signorini-run SCENE.toml [options]
   --method NAME      contact method in place of the scene's: implicit, filter
   --fail-safe NAME   unilateral_projection, inelastic_projection, rigid_zone
   --two-pass         answer scripts first, then all others: a baseline of the filter
+  --passes N         passes of the filter's impulses; 0: its zones answer alone what its springs leave
   --friction MU      friction coefficient of every body
   --steps N          stop after step N
   --threads N        worker threads (the results do not depend on it)
@@ -40,6 +41,7 @@ fn parse() -> Result<Option<Choice>, lexopt::Error> {
             Long("method") => options.method = Some(parser.value()?.string()?),
             Long("fail-safe") => options.fail_safe = Some(parser.value()?.string()?),
             Long("two-pass") => options.two_pass = true,
+            Long("passes") => options.passes = Some(parser.value()?.parse()?),
             Long("friction") => options.friction = Some(parser.value()?.parse()?),
             Long("steps") => options.steps = Some(parser.value()?.parse()?),
             Long("threads") => options.threads = parser.value()?.parse()?,

@@ -28,6 +28,8 @@ pub struct Options {
     pub fail_safe: Option<String>,
     /// Two passes of the filter, whatever the scene says.
     pub two_pass: bool,
+    /// Passes of the filter's impulses in place of the scene's; none: what collides after its springs goes to zones.
+    pub passes: Option<u32>,
     /// Friction coefficient of every body in place of the scene's.
     pub friction: Option<f64>,
     /// Step to stop at; `None`: the end of the scene.
@@ -47,7 +49,8 @@ pub struct Options {
 impl Options {
     /// Whether the scene runs as it is written.
     fn as_written(&self) -> bool {
-        self.method.is_none() && self.fail_safe.is_none() && self.friction.is_none() && !self.two_pass
+        let Options { method, fail_safe, two_pass, passes, friction, .. } = self;
+        method.is_none() && fail_safe.is_none() && !two_pass && passes.is_none() && friction.is_none()
     }
 }
 
@@ -136,6 +139,7 @@ fn choose(options: &Options, file: &mut SceneFile) -> Result<(), Failure> {
     if options.two_pass {
         file.settings.two_pass = Some(true);
     }
+    file.settings.passes_max = options.passes.or(file.settings.passes_max);
     if let Some(friction) = options.friction {
         not_negative(friction, "", "friction")
             .map_err(|fault| Failure::Usage(format!("friction: {}", fault.message)))?;
@@ -147,8 +151,13 @@ fn choose(options: &Options, file: &mut SceneFile) -> Result<(), Failure> {
 /// What a snapshot must agree with: the scene, what the options chose in its place, and the jitter.
 fn run_key(text: &str, options: &Options) -> u64 {
     // FNV-1a; not for adversaries.
-    let chosen = format!("{:?}{:?}{:?}", options.method, options.fail_safe, options.friction);
-    let chosen = if options.two_pass { chosen + "TwoPass" } else { chosen };
+    let mut chosen = format!("{:?}{:?}{:?}", options.method, options.fail_safe, options.friction);
+    if options.two_pass {
+        chosen += "TwoPass";
+    }
+    if let Some(passes) = options.passes {
+        chosen += &format!("Passes{passes}");
+    }
     let bytes = text.bytes().chain(chosen.bytes()).chain(options.jitter.to_le_bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }

@@ -53,6 +53,26 @@ fn cloth_slides_into_the_funnel_unstretched() {
     assert!(stretched < 0.1, "{line}");
 }
 
+/// [Harmon10, Figs 3.6, 3.8]: where zones have to answer what springs leave, cloth rigidifies in the funnel and hangs back on the
+/// trough with rigid zones; with projections it flows. The ball then drags at what does not follow it.
+#[test]
+fn rigid_zones_stick_where_projections_flow() {
+    let folder = Folder::new("zones-alone");
+    let steps = if all() { "500" } else { "120" };
+    let [rigid, inelastic, unilateral] = ["rigid_zone", "inelastic_projection", "unilateral_projection"].map(|name| {
+        let line = run(&folder, "funnel_coarse", &["--passes", "0", "--fail-safe", name, "--steps", steps]);
+        assert!(line["failsafes"].as_u64() > Some(10), "no zones: {line}");
+        line["elastic_energy_end"].as_f64().expect("a number")
+    });
+    assert!(unilateral < 0.1 && rigid > 2.0, "{rigid} {inelastic} {unilateral}");
+    assert!(all() || inelastic < 0.5, "{inelastic}");
+    let slide = |name| {
+        travel(&run(&folder, "ribbon", &["--passes", "0", "--friction", "0", "--fail-safe", name, "--steps", "200"]))
+    };
+    let (rigid, unilateral) = (slide("rigid_zone"), slide("unilateral_projection"));
+    assert!(rigid < 0.7 * unilateral, "{rigid} {unilateral}");
+}
+
 /// A hand that closes farther than the cloth in it leaves room for: the steps that press end pinched and name the cloth
 /// and the fingers; then the hand opens, and the cloth lies free.
 #[test]
