@@ -1,8 +1,8 @@
 //! The figures of [Otaduy09, §6]: rows of numbers that `benches/figures.py` draws.
 //!
-//! `cargo bench --bench figures -- anticipation OUT.csv [across=4] [layers=10] [steps=120] [every=10] [contacts=6000] [friction=0]`:
-//! soft boxes fall into a container with iterative anticipation; every N-th step with at most that many contacts is also
-//! done from the same state with full anticipation.
+//! `cargo bench --bench figures -- anticipation OUT.csv [across=4] [layers=10] [steps=120] [every=10] [contacts=6000]
+//! [friction=0]`: soft boxes fall into a container with iterative anticipation; every N-th step with at most that many
+//! contacts is also done from the same state with full anticipation.
 //!
 //! `cargo bench --bench figures -- ablation OUT.csv [steps=N]`: the scenes with parts of the method left out.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

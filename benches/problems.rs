@@ -1,7 +1,7 @@
 //! Writes contact problems from recorded cloth states, and of soft boxes heaped up.
 //!
-//! `cargo bench --bench problems -- boxes ACROSS STEPS OUT [dt=0.03]` lets ACROSS x ACROSS x 5 boxes fall for STEPS steps of
-//! 5 ms; the problem lists pairs nearer than 40 mm, thickness 10 mm, friction 0.4.
+//! `cargo bench --bench problems -- boxes ACROSS STEPS OUT [dt=0.03]` lets ACROSS x ACROSS x 5 boxes fall for STEPS
+//! steps of 5 ms; the problem lists pairs nearer than 40 mm, thickness 10 mm, friction 0.4.
 //!
 //! `cargo bench --bench problems -- sandwich SIDE OUT [speed=0.5]` presses three sheets of SIDE x SIDE vertices between the
 //! ground and a ceiling that comes down at that speed: every layer hands the load on.

@@ -1,7 +1,7 @@
 //! The solver trial: time to a velocity error, cold and warm, on problem files.
 //!
-//! `cargo bench --bench solvers -- [--solvers a,b] [--warm] [--curve] [--velocity 0.05] [--start 6] FILE...`; a file is what `benches/problems.rs`
-//! writes. References are tight solves, kept beside the files as `NAME.reference`.
+//! `cargo bench --bench solvers -- [--solvers a,b] [--warm] [--curve] [--velocity 0.05] [--start 6] FILE...`; a file is
+//! what `benches/problems.rs` writes. References are tight solves, kept beside the files as `NAME.reference`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 #[allow(dead_code, unused_imports)]

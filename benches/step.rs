@@ -1,10 +1,13 @@
 //! Whole steps of whole scenes: what they cost, what they did, and how far the velocities are from a tight solve.
 //!
-//! `cargo bench --bench step -- [SCENE...] [steps=N] [seed=S] [threads=T] [tight=N] [frames=DIR] [record=STEP,STEP:DIR] [range=M] [contact=T] [velocity=T] [trace]`
+//! `cargo bench --bench step -- [SCENE...] [steps=N] [seed=S] [threads=T] [tight=N] [frames=DIR] [record=STEP,STEP:DIR]
+//! [range=M] [contact=T] [velocity=T] [trace]`
 //!
-//! Scenes: drape, crumple, pile, cube, ball, boxes, tower. `tight=N` solves every Nth step again to a tolerance far below the
-//! default and compares; `frames=DIR` writes the elastic vertices of every tenth step as `f64`; `record=` writes the contact problems
-//! before those steps, pairs nearer than `range` (0.004); `contact=` and `velocity=` set the tolerances; `trace` prints a line per step. Times are processor seconds of the calling thread, so give threads=0 (serial, the default) for figures.
+//! Scenes: drape, crumple, pile, cube, ball, boxes, tower. `tight=N` solves every Nth step again to a tolerance far
+//! below the default and compares; `frames=DIR` writes the elastic vertices of every tenth step as `f64`; `record=`
+//! writes the contact problems before those steps, pairs nearer than `range` (0.004); `contact=` and `velocity=` set
+//! the tolerances; `trace` prints a line per step. Times are processor seconds of the calling thread, so give threads=0
+//! (serial, the default) for figures.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 #[allow(dead_code, unused_imports)]
@@ -117,7 +120,8 @@ fn run(name: &str, choice: &Choice) {
     summary(name, &all, &mut errors);
 }
 
-/// Error of the step's velocity changes in the norm of A, against a tight solve from the same state, where there is contact.
+/// Error of the step's velocity changes in the norm of A, against a tight solve from the same state, where there is
+/// contact.
 fn velocity_error(host: &mut Host, par: Par) -> Option<f64> {
     let linear = host.prepare();
     let mut ends = [Vec::new(), Vec::new()];

@@ -8,9 +8,10 @@ use signorini::kinematics::Pose;
 use signorini::math::{Mat3, Vec3, add_scaled, dot, mat_vec, norm, sub};
 use signorini::model::{
     BodyDescription, CombineRule, Drives, HalfSpace, Kind, Material, Materials, Model, Precision, Settings, State,
-    StepError, StepReport, StepResult, Surface, System, SystemDescription,
+    StepError, StepReport, StepResult, Surface, System, SystemDescription, Watch,
 };
 use signorini::parallel::Par;
+use signorini::step::Step;
 use std::sync::Arc;
 
 /// What a world is made of, before it is built. Elastic bodies first, then rigid bodies, then obstacles.
@@ -219,22 +220,18 @@ impl Host {
         linear
     }
 
+    /// One step with the drives as they are.
+    pub fn advance(&mut self, par: Par) -> Result<StepReport, StepError> {
+        let Self { model, state, drives, memory, settings, dt, result, scratch, .. } = self;
+        advance(Step { model, state, drives, settings, dt: *dt, result, par, watch: Watch::default() }, memory, scratch)
+    }
+
     /// Advances by one step and draws up the balances.
     pub fn step(&mut self, par: Par) -> Result<Facts, StepError> {
         let start = thread_seconds();
         let linear = self.prepare();
         let prepared = thread_seconds();
-        let report = advance(
-            &self.model,
-            &mut self.state,
-            &self.drives,
-            &mut self.memory,
-            &self.settings,
-            self.dt,
-            &mut self.result,
-            &mut self.scratch,
-            par,
-        )?;
+        let report = self.advance(par)?;
         let seconds = thread_seconds() - prepared;
         self.velocities.clone_from(&self.result.end_velocities);
         Ok(self.facts(&linear, report, seconds, prepared - start))
@@ -245,17 +242,17 @@ impl Host {
     pub fn step_of_a_copy(&mut self, settings: &Settings, par: Par) -> Result<(f64, StepReport), StepError> {
         let (mut state, mut memory) = (self.state.clone(), self.memory.clone());
         let clock = thread_seconds();
-        let report = advance(
-            &self.model,
-            &mut state,
-            &self.drives,
-            &mut memory,
+        let step = Step {
+            model: &self.model,
+            state: &mut state,
+            drives: &self.drives,
             settings,
-            self.dt,
-            &mut self.result,
-            &mut self.scratch,
+            dt: self.dt,
+            result: &mut self.result,
             par,
-        )?;
+            watch: Watch::default(),
+        };
+        let report = advance(step, &mut memory, &mut self.scratch)?;
         Ok((thread_seconds() - clock, report))
     }
 

@@ -31,9 +31,10 @@ pub struct BuiltRows {
 
 /// Builds the rows about a tentative motion.
 ///
-/// `required_gaps` holds d per contact; `frames` a first tangent per contact to keep while it sticks. Targets follow from the gap at
-/// the tentative end: `c = (d - gap(x1))/dt + J dv`, exact at that motion, so that a fixed point of solving and
-/// rebuilding satisfies the true gaps of turning bodies [DESIGN: rows are re-linearised]. Cost: linear in contacts.
+/// `required_gaps` holds d per contact; `frames` a first tangent per contact to keep while it sticks. Targets follow
+/// from the gap at the tentative end: `c = (d - gap(x1))/dt + J dv`, exact at that motion, so that a fixed point of
+/// solving and rebuilding satisfies the true gaps of turning bodies [DESIGN: rows are re-linearised]. Cost: linear in
+/// contacts.
 pub fn build_rows(
     model: &Model,
     metric: &Metric,

@@ -160,8 +160,8 @@ impl BroadPhase {
         merge(edge_edge, self.edges.len(), &mut out.edge_edge, par);
     }
 
-    /// Adds to `out` the pairs of [`BroadPhase::candidates`] that have a vertex for which `woken` says yes, so that it stays
-    /// sorted and has each pair once.
+    /// Adds to `out` the pairs of [`BroadPhase::candidates`] that have a vertex for which `woken` says yes, so that it
+    /// stays sorted and has each pair once.
     ///
     /// Cost: linear, plus what the leaves with such vertices meet.
     pub fn add_candidates(&self, woken: &[bool], filter: &Filter, out: &mut Candidates, par: Par) {

@@ -110,9 +110,9 @@ impl SheetMaterial {
     /// bending.
     ///
     /// An edge spring has `k = E h (areas of its faces) / L^2`, which gives a sheet Young's modulus E on regular meshes
-    /// [VanGelder98, triangle meshes]; Poisson's ratio is whatever the mesh makes of it. A bending spring has `k = bend_ratio` times that of
-    /// the edge that it crosses, and 0 leaves them out; a bending stiffness that is given (not that of the plate) adds
-    /// hinges. Errors and cost as for the shell.
+    /// [VanGelder98, triangle meshes]; Poisson's ratio is whatever the mesh makes of it. A bending spring has
+    /// `k = bend_ratio` times that of the edge that it crosses, and 0 leaves them out; a bending stiffness that is
+    /// given (not that of the plate) adds hinges. Errors and cost as for the shell.
     pub fn mass_spring(&self, rest: &[Vec3], faces: &[[u32; 3]], bend_ratio: f64) -> Result<Forces, MaterialFault> {
         self.check()?;
         if !(bend_ratio >= 0.0 && bend_ratio.is_finite()) {

@@ -1,6 +1,6 @@
 //! The smallest vector that meets equations which may repeat or contradict each other.
 
-use super::zone_factor::ZoneFactor;
+use super::zone_factor::{LateFactor, ZoneFactor};
 use super::zone_rows::{ZoneRows, inner};
 use crate::math::{Vec3, add_scaled, scale};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -42,17 +42,18 @@ pub(super) struct MinimumNorm {
 
 /// The least-squares solution of `A y = r` of smallest norm, at the rank cut.
 ///
-/// Few rows: by the eigenvectors of `A A^T`, refined once. More: by the factor in the unknowns where there is one, else by a
-/// factor of `A A^T` with the square of the cut on its diagonal, refined: directions below the cut fade out. Many, or such as contradict each other: by the bidiagonalisation of Golub and Kahan in the form
-/// of Paige and Saunders, at most three times four steps a row; there the cut is what that many steps do not reach. Cost:
-/// cubic in few rows, else linear in entries times steps.
-pub(super) fn minimum_norm(rows: &ZoneRows, right: &[f64], factor: &mut Option<ZoneFactor>) -> MinimumNorm {
+/// Few rows: by the eigenvectors of `A A^T`, refined once. More: by the factor in the unknowns where there is one, else by
+/// a factor of `A A^T` with the square of the cut on its diagonal, refined: directions below the cut fade out. Many, or
+/// such as contradict each other: by the bidiagonalisation of Golub and Kahan in the form of Paige and Saunders, at most
+/// three times four steps a row; there the cut is what that many steps do not reach. Cost: cubic in few rows, else linear
+/// in entries times steps.
+pub(super) fn minimum_norm(rows: &ZoneRows, right: &[f64], factor: &mut LateFactor) -> MinimumNorm {
     if rows.len() <= DENSE_ROWS
         && let Some(solution) = by_spectrum(rows, right)
     {
         return solution;
     }
-    if let Some(factor) = factor
+    if let Some(factor) = factor.of(rows)
         && let Some(solution) = by_unknowns(rows, right, factor)
     {
         return solution;

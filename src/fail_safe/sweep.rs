@@ -3,6 +3,7 @@
 use crate::contact_search::{
     BodyFilter, CandidateSearch, Contact, Hit, Passing, near_contacts, renewed_hits, swept_hits,
 };
+use crate::detection::Candidates;
 use crate::math::Vec3;
 use crate::model::{Segment, State};
 use crate::parallel::Par;
@@ -22,38 +23,42 @@ pub struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
+    /// Hits of the motion to `end`.
+    pub fn hits(&self, end: &State, candidates: &mut CandidateSearch) -> Vec<Hit> {
+        let found = self.candidates(end, candidates);
+        swept_hits(self.segment.model, self.filter, self.passing, found, self.segment.start, end, self.par)
+    }
+
+    /// [`Sweep::hits`] where those to other end positions are known: what ends where it ended is not tested again. The
+    /// same hits.
+    pub fn hits_again(
+        &self,
+        end: &State,
+        (known, hits): (&[Vec3], &[Hit]),
+        candidates: &mut CandidateSearch,
+    ) -> Vec<Hit> {
+        let moved: Vec<bool> = end.positions.iter().zip(known).map(|(a, b)| a != b).collect();
+        let (start, model) = (self.segment.start, self.segment.model);
+        let found = self.candidates(end, candidates);
+        renewed_hits(model, self.filter, self.passing, found, (start, end), hits, &moved, self.par)
+    }
+
     /// End state after `share` of the segment with these velocities, rounded to the hosts' formats, and its hits.
     pub fn test(&self, velocities: &[Vec3], share: f64, candidates: &mut CandidateSearch) -> (State, Vec<Hit>) {
         let mut end = State::default();
         self.segment.end_state(velocities, share, true, &mut end);
-        let start = self.segment.start;
-        let (model, par) = (self.segment.model, self.par);
-        let found = candidates.update(model, self.filter, &start.positions, &end.positions, self.factor, par);
-        let hits = swept_hits(model, self.filter, self.passing, found, start, &end, par);
+        let hits = self.hits(&end, candidates);
         (end, hits)
     }
 
-    /// Contacts that are closer than their thickness at the start, as [`near_contacts`].
-    pub fn near(&self, end: &State, candidates: &mut CandidateSearch) -> Vec<Contact> {
-        let (start, model, par) = (self.segment.start, self.segment.model, self.par);
-        let found = candidates.update(model, self.filter, &start.positions, &end.positions, self.factor, par);
-        near_contacts(model, self.filter, self.passing, found, start, end, 1.0, par)
+    /// Contacts that are closer than `factor` times their thickness at the start, as [`near_contacts`].
+    pub fn near(&self, end: &State, factor: f64, candidates: &mut CandidateSearch) -> Vec<Contact> {
+        let found = self.candidates(end, candidates);
+        near_contacts(self.segment.model, self.filter, self.passing, found, self.segment.start, end, factor, self.par)
     }
 
-    /// [`Sweep::test`] of the whole segment where the hits of another end are known: what ends where it ended is not tested
-    /// again. The same hits.
-    pub fn test_again(
-        &self,
-        velocities: &[Vec3],
-        (known, hits): (&State, &[Hit]),
-        candidates: &mut CandidateSearch,
-    ) -> (State, Vec<Hit>) {
-        let mut end = State::default();
-        self.segment.end_state(velocities, 1.0, true, &mut end);
-        let (start, model, par) = (self.segment.start, self.segment.model, self.par);
-        let moved: Vec<bool> = end.positions.iter().zip(&known.positions).map(|(a, b)| a != b).collect();
-        let found = candidates.update(model, self.filter, &start.positions, &end.positions, self.factor, par);
-        let hits = renewed_hits(model, self.filter, self.passing, found, (start, &end), hits, &moved, par);
-        (end, hits)
+    fn candidates<'a>(&self, end: &State, candidates: &'a mut CandidateSearch) -> &'a Candidates {
+        let Segment { model, start, .. } = self.segment;
+        candidates.update(model, self.filter, &start.positions, &end.positions, self.factor, self.par)
     }
 }

@@ -1,7 +1,7 @@
 //! The smallest change of velocities after which no row falls short: impulses push and never pull [Harmon10, §3.5].
 
 use super::active_set::active_set;
-use super::zone_factor::ZoneFactor;
+use super::zone_factor::{LateFactor, ZoneFactor};
 use super::zone_rows::{ZoneRows, inner};
 use crate::math::{Vec3, add_scaled, scale};
 
@@ -30,8 +30,9 @@ const PROGRESS: f64 = 0.5;
 /// Complementarity, relative to the largest demand, at which the projection has converged.
 const TOLERANCE: f64 = 1e-13;
 
-/// Where unknowns would have to change by this many times the largest demand, in the mean square, rows contradict each other.
-const ESCAPE: f64 = 16.0;
+/// Where unknowns would have to change by this many times the largest demand there is no projection: rows contradict each
+/// other, or would have the zone slip out of what squeezes it.
+pub(super) const ESCAPE: f64 = 16.0;
 
 /// Complementarity that is accepted where no more is to be had.
 pub(super) const TRUSTED: f64 = 1e-4;
@@ -46,21 +47,17 @@ pub(super) struct Unilateral {
 /// The smallest `y` with `A y >= demand`.
 ///
 /// The complementarity problem that simplex methods could not solve robustly [Harmon10, §3.5] is the projection onto a
-/// convex cone. Few unknowns are a matter for [`active_set`]. Else the method of multipliers makes it a sequence of smooth convex problems, each solved by Newton steps
-/// (factored in the unknowns where that is cheap, else by conjugate gradients) with an exact line search; rows that repeat
-/// or contradict each other leave all of these well posed. Everything is in terms of what an update changes, so that
-/// rounding shrinks with it. Rows that cannot be met end at the work cap, near their least squares. Cost: at most 40
-/// updates, 200 Newton steps of a factorisation or 400 iterations. A guess of the multipliers saves most of that; it may
-/// be empty.
-pub(super) fn unilateral(
-    rows: &ZoneRows,
-    demand: &[f64],
-    guess: &[f64],
-    factor: &mut Option<ZoneFactor>,
-) -> Unilateral {
+/// convex cone. Few unknowns are a matter for [`active_set`]. Else the method of multipliers makes it a sequence of smooth
+/// convex problems, each solved by Newton steps (factored in the unknowns where that is cheap, else by conjugate
+/// gradients) with an exact line search; rows that repeat or contradict each other leave all of these well posed.
+/// Everything is in terms of what an update changes, so that rounding shrinks with it. Rows that cannot be met end by
+/// duality or at the work cap, near their least squares. Cost: at most 40 updates, 200 Newton steps of a factorisation or
+/// 400 iterations. A guess of the multipliers saves most of that; it may be empty.
+pub(super) fn unilateral(rows: &ZoneRows, demand: &[f64], guess: &[f64], factor: &mut LateFactor) -> Unilateral {
     if let Some(solution) = active_set(rows, demand, guess) {
         return solution;
     }
+    let mut factor = factor.of(rows);
     let size = demand.iter().fold(0.0_f64, |m, c| m.max(*c));
     let penalties: &[f64] = if factor.is_some() { &PENALTIES_FACTORED } else { &PENALTIES };
     let mut state = Multipliers::new(rows, demand);
@@ -85,7 +82,7 @@ pub(super) fn unilateral(
         last = complementarity;
         let sigma = penalties[update.min(penalties.len() - 1)];
         let tolerance = 1e-2 * size * complementarity.min(1.0);
-        steps += state.update(rows, demand, sigma, NEWTON_STEPS - steps, tolerance, factor);
+        steps += state.update(rows, demand, sigma, NEWTON_STEPS - steps, tolerance, factor.as_deref_mut());
     }
     let converged = state.complementarity() <= TRUSTED * size;
     state.finished(converged)
@@ -125,7 +122,7 @@ impl Multipliers {
         sigma: f64,
         steps_max: usize,
         tolerance: f64,
-        factor: &mut Option<ZoneFactor>,
+        mut factor: Option<&mut ZoneFactor>,
     ) -> usize {
         let mut change = vec![[0.0; 3]; rows.width];
         // lambda + sigma (demand - A (y + d)), pushing or not.
@@ -150,7 +147,7 @@ impl Multipliers {
                 break;
             }
             steps += 1;
-            let direction = newton_direction(rows, &active, sigma, &gradient, factor);
+            let direction = newton_direction(rows, &active, sigma, &gradient, factor.as_deref_mut());
             let speeds: Vec<f64> = (0..rows.len()).map(|i| -sigma * rows.product(i, &direction)).collect();
             let slope = inner(&gradient, &direction);
             let way = lowest(&pushes, &speeds, sigma, slope, inner(&direction, &direction));
@@ -213,7 +210,7 @@ fn newton_direction(
     active: &[usize],
     sigma: f64,
     gradient: &[Vec3],
-    factor: &mut Option<ZoneFactor>,
+    factor: Option<&mut ZoneFactor>,
 ) -> Vec<Vec3> {
     let mut direction: Vec<Vec3> = gradient.iter().map(|g| scale(-1.0, *g)).collect();
     if let Some(factor) = factor

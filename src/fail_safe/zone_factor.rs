@@ -20,9 +20,20 @@ pub(super) struct ZoneFactor {
     buffer: Vec<Vec3>,
 }
 
+/// The factor of a zone, made when it is first asked for.
+#[derive(Default)]
+pub(super) struct LateFactor(Option<Option<ZoneFactor>>);
+
+impl LateFactor {
+    /// As of [`ZoneFactor::new`]; the rows are the same each time.
+    pub fn of(&mut self, rows: &ZoneRows) -> Option<&mut ZoneFactor> {
+        self.0.get_or_insert_with(|| ZoneFactor::new(rows)).as_mut()
+    }
+}
+
 impl ZoneFactor {
     /// Of a zone's rows; `None` where its factor would cost more than iterations do. Cost: a sort of the entries' pairs.
-    pub fn new(rows: &ZoneRows) -> Option<ZoneFactor> {
+    fn new(rows: &ZoneRows) -> Option<ZoneFactor> {
         let mut pairs = Vec::new();
         for i in 0..rows.len() {
             for (a, _) in rows.row(i) {
@@ -42,7 +53,8 @@ impl ZoneFactor {
         Some(ZoneFactor { no_fixed: vec![false; rows.width], matrix, envelope, factor, places, offsets, buffer })
     }
 
-    /// Factors `I + sigma A_S^T A_S` for the rows `set`; whether rounding has left it positive definite. Cost: the envelope's.
+    /// Factors `I + sigma A_S^T A_S` for the rows `set`; whether rounding has left it positive definite. Cost: the
+    /// envelope's.
     pub fn assign(&mut self, rows: &ZoneRows, set: &[usize], sigma: f64) -> bool {
         self.matrix.values.fill([[0.0; 3]; 3]);
         for k in &self.matrix.diagonal {

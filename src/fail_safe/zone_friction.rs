@@ -1,7 +1,7 @@
 //! Friction within a projected zone: slides slow down, each within its own limit or all within one [Harmon10, §3.7].
 
 use super::minimum_norm::minimum_norm;
-use super::zone_factor::ZoneFactor;
+use super::zone_factor::LateFactor;
 use super::zone_rows::{ZoneRows, inner};
 use crate::math::{Vec3, add_scaled, scale};
 
@@ -78,7 +78,7 @@ impl ContactFriction {
 /// approaches.
 pub(super) fn zone_friction(rows: &ZoneRows, relative: &[f64], coefficient: f64, response: f64, y: &mut [Vec3]) {
     let against: Vec<f64> = relative.iter().map(|u| -u).collect();
-    let slide = minimum_norm(rows, &against, &mut ZoneFactor::new(rows)).y;
+    let slide = minimum_norm(rows, &against, &mut LateFactor::default()).y;
     let length = inner(&slide, &slide).sqrt();
     if length == 0.0 {
         return;

@@ -2,7 +2,7 @@
 
 use super::minimum_norm::minimum_norm;
 use super::unilateral_projection::unilateral;
-use super::zone_factor::ZoneFactor;
+use super::zone_factor::LateFactor;
 use super::zone_friction::{ContactFriction, zone_friction};
 use super::zone_rows::{ZoneBlocks, ZoneRows, inner};
 use crate::constraint::{Metric, RowSet};
@@ -85,7 +85,7 @@ pub(super) fn project(
     let guess: Vec<f64> = guess.iter().zip(&normals.scales).map(|(g, s)| g * inverse(*s)).collect();
     let mut zone = Zone {
         y: vec![[0.0; 3]; normals.width],
-        factor: ZoneFactor::new(&normals),
+        factor: LateFactor::default(),
         normals,
         demand,
         unilateral: response.fail_safe != FailSafe::InelasticProjection,
@@ -121,8 +121,8 @@ pub(super) fn project(
 /// A projection under way.
 struct Zone {
     normals: ZoneRows,
-    /// Of the normals, unless that would cost too much.
-    factor: Option<ZoneFactor>,
+    /// Of the normals.
+    factor: LateFactor,
     /// Wanted `A y`.
     demand: Vec<f64>,
     /// Response so far.

@@ -4,6 +4,7 @@
 use super::nodes::Nodes;
 use super::rigid_zone::move_zone;
 use super::sweep::Sweep;
+use super::unilateral_projection::ESCAPE;
 use super::zone_projection::{Projected, ZoneResponse, project};
 use crate::constraint::{BuiltRows, Linearisation, Metric, build_rows};
 use crate::contact_search::{CandidateSearch, Contact, Hit, Pair};
@@ -23,10 +24,6 @@ const ROWS_OF_PAIR: u32 = 4;
 /// Share of their gaps that rows ask for where the whole leaves no solution: above the half that continuous detection
 /// keeps.
 const SQUEEZED: f64 = 0.6;
-
-/// A zone that scripted parts squeeze has no projection where it would have to slip out this many times as fast as what its
-/// rows ask for.
-const ESCAPE: f64 = 16.0;
 
 /// How often a zone with rigid bodies is projected in a round, each time about the motion found last.
 const LINEARISATIONS: usize = 2;
@@ -77,9 +74,10 @@ pub struct ZoneOutcome {
 /// be done.
 ///
 /// Collisions that share a movable node are in one zone; those that share only a scripted one are not. Projected motion
-/// is tested by continuous detection like any other (where thickness leaves no solution, 0.6 of it is asked for): a pair that is hit again owns another row, at its new impact. After
-/// 12 rounds, or when a pair is hit a fifth time or a projection finds no solution, its zone moves as a rigid body. A pair of scripted parts ends it at once.
-/// Cost: at most 22 rounds, each of continuous detection and of the zones that were hit.
+/// is tested by continuous detection like any other (where thickness leaves no solution, 0.6 of it is asked for): a
+/// pair that is hit again owns another row, at its new impact. After 12 rounds, or when a pair is hit a fifth time or a
+/// projection finds no solution, its zone moves as a rigid body. A pair of scripted parts ends it at once. Cost: at
+/// most 22 rounds, each of continuous detection and of the zones that were hit.
 pub fn resolve_zones(
     sweep: &Sweep,
     metric: &Metric,
@@ -97,8 +95,11 @@ pub fn resolve_zones(
             break;
         }
         if round == 1 && response.fail_safe == FailSafe::UnilateralProjection {
-            zones.near =
-                sweep.near(&outcome.end, candidates).into_iter().map(|contact| Near::new(contact, &nodes)).collect();
+            zones.near = sweep
+                .near(&outcome.end, 1.0, candidates)
+                .into_iter()
+                .map(|contact| Near::new(contact, &nodes))
+                .collect();
         }
         zones.take_near();
         let touched = zones.touched(&outcome.hits, &nodes);
@@ -108,10 +109,13 @@ pub fn resolve_zones(
         let failed = |zone: &&Zone| reports.get(&zone.root).is_some_and(|r| r.fail_safe == FailSafe::RigidZone);
         touched.iter().filter(failed).for_each(|zone| zones.rigid[zone.root] = true);
         outcome.rounds += 1;
-        (outcome.end, outcome.hits) = match outcome.rounds {
-            1 => sweep.test(&outcome.velocities, 1.0, candidates),
-            _ => sweep.test_again(&outcome.velocities, (&outcome.end, &outcome.hits), candidates),
+        let mut end = State::default();
+        sweep.segment.end_state(&outcome.velocities, 1.0, true, &mut end);
+        outcome.hits = match outcome.rounds {
+            1 => sweep.hits(&end, candidates),
+            _ => sweep.hits_again(&end, (&outcome.end.positions, &outcome.hits), candidates),
         };
+        outcome.end = end;
         if outcome.hits.is_empty() {
             break;
         }

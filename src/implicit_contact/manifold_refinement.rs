@@ -3,11 +3,11 @@
 use super::constraint_set::ConstraintSet;
 use super::{ContactProblem, Memory, SolverReport, SolverScratch, solve};
 use crate::constraint::{BuiltRows, Linearisation, Metric, build_rows};
-use crate::contact_search::{CandidateSearch, Hit, Passing, near_contacts, swept_hits};
+use crate::contact_search::{CandidateSearch, Hit};
 use crate::math::{Vec3, add, mat_vec, norm, scale, sub};
 use crate::model::{Phase, Precision, Segment, Settings, State, StepError, StepReport};
 use crate::parallel::Par;
-use crate::step::{PartEnd, SolvedContact, Surroundings, lap};
+use crate::step::{PartEnd, PartStart, SolvedContact, lap};
 use std::time::Instant;
 
 /// Factor of the tolerances when the solver missed a row that continuous detection then hit.
@@ -86,56 +86,37 @@ fn book(solve: &SolverReport, report: &mut StepReport) {
 
 /// Refines the constraint manifold until the tentative end is clean or the rounds are used up. Errors: cancelled.
 pub(super) fn refine(
-    around: &Surroundings,
-    segment: &Segment,
-    passing: &Passing,
+    part: &PartStart,
     memory: &Memory,
     solver: &mut SolverScratch,
     search: &mut CandidateSearch,
     report: &mut StepReport,
 ) -> Result<Refined, StepError> {
-    let (model, par) = (segment.model, around.par);
-    let mut settings = *around.settings;
+    let (sweep, segment) = (part.sweep(), &part.segment);
+    let model = segment.model;
+    let mut settings = *part.settings;
     let mut clock = Instant::now();
     let mut refined = Refined { velocities: segment.drives.velocities.clone(), ..Refined::default() };
     let mut linear_end = State::default();
     segment.end_state(&refined.velocities, 1.0, false, &mut linear_end);
-    let factor = settings.proximity_factor.max(1.0);
-    let x0 = &segment.start.positions;
-    let candidates = search.update(model, around.filter, x0, &linear_end.positions, factor, par);
-    let near = if settings.ablation.near_contacts {
-        near_contacts(model, around.filter, passing, candidates, segment.start, &linear_end, factor, par)
-    } else {
-        Vec::new()
-    };
+    let near = if settings.ablation.near_contacts { sweep.near(&linear_end, sweep.factor, search) } else { Vec::new() };
     refined.set = ConstraintSet::new(model, near, memory, &settings, segment.dt);
     refined.set.admit(model, &linear_end.positions, 1.0, memory, &settings, segment.dt);
     report.times.search += lap(&mut clock);
-    let scale_of_motion = fastest(x0, &linear_end.positions, segment.dt);
+    let scale_of_motion = fastest(&segment.start.positions, &linear_end.positions, segment.dt);
     let mut tolerance_factor = 1.0;
     let mut tightened = false;
     let mut clean: Option<Refined> = None;
     let mut rounds_left = settings.rounds_max.max(1);
     while rounds_left > 0 {
-        around.watch.ask(Phase::Round, segment.from)?;
+        part.watch.ask(Phase::Round, segment.from)?;
         rounds_left -= 1;
         report.rounds += 1;
-        let converged = solve_round(
-            around,
-            segment,
-            &linear_end,
-            scale_of_motion,
-            tolerance_factor,
-            memory,
-            &mut refined,
-            solver,
-            report,
-        );
+        let converged =
+            solve_round(part, &linear_end, scale_of_motion, tolerance_factor, memory, &mut refined, solver, report);
         clock = Instant::now();
         segment.end_state(&refined.velocities, 1.0, true, &mut refined.end);
-        let x1 = &refined.end.positions;
-        let candidates = search.update(model, around.filter, x0, x1, factor, par);
-        refined.hits = swept_hits(model, around.filter, passing, candidates, segment.start, &refined.end, par);
+        refined.hits = sweep.hits(&refined.end, search);
         report.times.detection += lap(&mut clock);
         unrounded_end(segment, &refined, &mut linear_end);
         let end = &linear_end.positions;
@@ -174,8 +155,7 @@ pub(super) fn refine(
 /// Steps 4.1 and 4.2: rows about the last tentative motion, constrained dynamics, new velocities; whether the solver
 /// met its tolerances.
 fn solve_round(
-    around: &Surroundings,
-    segment: &Segment,
+    part: &PartStart,
     about: &State,
     scale_of_motion: f64,
     tolerance_factor: f64,
@@ -185,7 +165,8 @@ fn solve_round(
     step_report: &mut StepReport,
 ) -> bool {
     let mut clock = Instant::now();
-    let (model, metric, unconstrained) = (segment.model, around.metric, &segment.drives.velocities);
+    let (segment, metric) = (&part.segment, part.metric);
+    let (model, unconstrained) = (segment.model, &segment.drives.velocities);
     let about = Linearisation {
         start: segment.start,
         end: about,
@@ -212,8 +193,8 @@ fn solve_round(
     let demanded = built.rows.normal_targets.iter().fold(0.0_f64, |a, c| a.max(*c));
     let velocity_scale = scale_of_motion.max(demanded);
     let settings = Settings {
-        iterations_max: iterations_left(around.settings.iterations_max, step_report.iterations),
-        ..solve_tolerances(around.settings, set, segment.dt * velocity_scale, tolerance_factor)
+        iterations_max: iterations_left(part.settings.iterations_max, step_report.iterations),
+        ..solve_tolerances(part.settings, set, segment.dt * velocity_scale, tolerance_factor)
     };
     let problem = ContactProblem {
         matrix: &metric.matrix,
@@ -223,7 +204,7 @@ fn solve_round(
         velocity_scale,
     };
     let report = if velocity_scale > 0.0 {
-        solve_balanced(&problem, metric, &built, &mut impulses, &mut dv, &settings, solver, around.par)
+        solve_balanced(&problem, metric, &built, &mut impulses, &mut dv, &settings, solver, part.par)
     } else {
         // Nothing moves and no row asks for anything.
         impulses.fill([0.0; 3]);
@@ -231,7 +212,7 @@ fn solve_round(
         SolverReport { converged: true, ..SolverReport::default() }
     };
     book(&report, step_report);
-    set.keep(around.settings.friction_cone, &built, &impulses);
+    set.keep(part.settings.friction_cone, &built, &impulses);
     refined.block_impulses = block_impulses(model.block_count, &built, &impulses);
     refined.built = built;
     for block in 0..model.block_count {

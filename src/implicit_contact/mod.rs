@@ -45,6 +45,6 @@ mod splitting_start;
 mod stop_test;
 mod velocity_error;
 
-pub use advance::{Scratch, advance, advance_watched};
+pub use advance::{Scratch, advance};
 pub use memory::{Memory, RememberedContact};
 pub use problem::{ContactProblem, SolverReport, SolverScratch, solve};

@@ -27,7 +27,8 @@ pub enum GradientEnding {
 /// Solves `K x = b` from the given `x`, with `apply(d, out)` for `K d` and `precondition(r, out)` for a positive
 /// definite `M^-1 r`, until the residual in the norm of `M^-1` is `tolerance` times that of `b`. Returns the steps made.
 ///
-/// `initial_zero` starts from zero whatever `x` holds, which saves a product. Cost of a step: one `apply`, one `precondition`.
+/// `initial_zero` starts from zero whatever `x` holds, which saves a product. Cost of a step: one `apply`, one
+/// `precondition`.
 #[allow(clippy::too_many_arguments)]
 pub fn conjugate_gradient(
     mut apply: impl FnMut(&[Vec3], &mut [Vec3]),

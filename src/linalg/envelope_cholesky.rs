@@ -17,7 +17,8 @@ pub struct Envelope {
 }
 
 impl Envelope {
-    /// Reverse Cuthill-McKee order [George81, chapter 4], from a node far out in each component. Cost: a few passes over the pattern.
+    /// Reverse Cuthill-McKee order [George81, chapter 4], from a node far out in each component. Cost: a few passes
+    /// over the pattern.
     pub fn new(matrix: &BlockMatrix) -> Envelope {
         let n = matrix.rows();
         let mut order: Vec<u32> = Vec::with_capacity(n);

@@ -155,8 +155,9 @@ impl IntegerPolynomial {
 
     /// The roots in [0, 1] in ascending order, each once; none for the zero polynomial.
     ///
-    /// Cost: Bernstein coefficients; where these leave it open, Sturm's sequence of the square-free part and one evaluation of it per halving; the number of halvings is
-    /// bounded by the separation of the roots, a polynomial in the length of the coefficients.
+    /// Cost: Bernstein coefficients; where these leave it open, Sturm's sequence of the square-free part and one
+    /// evaluation of it per halving; the number of halvings is bounded by the separation of the roots, a polynomial in
+    /// the length of the coefficients.
     pub fn roots_in_unit_interval(&self) -> Vec<Root> {
         let mut roots = Vec::new();
         if self.len < 2 {

@@ -131,8 +131,8 @@ impl Par<'_> {
         }
     }
 
-    /// Calls `f(start, block of a, block of b)` for disjoint blocks of `size` items of two slices of one length; returns the
-    /// sum of what it returns, in the order of the blocks.
+    /// Calls `f(start, block of a, block of b)` for disjoint blocks of `size` items of two slices of one length;
+    /// returns the sum of what it returns, in the order of the blocks.
     pub fn update_pairs_and_sum<A: Send, B: Send>(
         &self,
         size: usize,

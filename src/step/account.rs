@@ -32,15 +32,15 @@ pub struct StepAccount {
 }
 
 impl StepAccount {
-    /// No part done yet, from `state`, with what was reported before the first.
-    pub fn new(model: &Model, state: &State, drives: &Drives, report: StepReport) -> StepAccount {
+    /// No part done yet, from `state`.
+    pub fn new(model: &Model, state: &State, drives: &Drives) -> StepAccount {
         StepAccount {
             state: state.clone(),
             impulses: vec![[0.0; 3]; model.block_count],
             end_velocities: drives.velocities.clone(),
             last: PartEnd::default(),
             last_dt: 0.0,
-            report: StepReport { certified_fraction: 1.0, ..report },
+            report: StepReport { certified_fraction: 1.0, ..StepReport::default() },
         }
     }
 

@@ -1,10 +1,10 @@
 //! What every method carries from step to step, and the check of the start state.
 
+use super::whole::Step;
 use crate::contact_search::{BodyFilter, CandidateSearch, Passing, intersections_with};
 use crate::dynamics::Accelerations;
 use crate::math::Vec3;
-use crate::model::{HalfSpace, Model, Settings, StartPolicy, State, StepError, StepReport};
-use crate::parallel::Par;
+use crate::model::{HalfSpace, Model, StartPolicy, State, StepError, StepReport};
 
 /// What every method carries from step to step; its accelerations are part of a snapshot.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,21 +49,18 @@ impl Carried {
 /// The start state: nothing to do for one that the last step certified; else an exact search for intersections.
 ///
 /// Errors: `IntersectingStart` under the policy REFUSE.
-pub fn start_state(
-    model: &Model,
+pub(super) fn start_state(
+    step: &Step,
     filter: &BodyFilter,
-    state: &State,
     carried: &Carried,
-    settings: &Settings,
     report: &mut StepReport,
     search: &mut CandidateSearch,
-    par: Par,
 ) -> Result<Passing, StepError> {
-    if carried.knows(model, filter, state) {
+    if carried.knows(step.model, filter, step.state) {
         return Ok(Passing::default());
     }
-    let tangle = intersections_with(search, model, filter, state, par);
-    if !tangle.witnesses.is_empty() && settings.start_policy == StartPolicy::Refuse {
+    let tangle = intersections_with(search, step.model, filter, step.state, step.par);
+    if !tangle.witnesses.is_empty() && step.settings.start_policy == StartPolicy::Refuse {
         return Err(StepError::IntersectingStart(tangle.witnesses));
     }
     report.tangled_pairs = tangle.witnesses.len() as u32;

@@ -1,19 +1,16 @@
 //! What was pushed: sizes fit, everything is finite and within range.
 
+use super::whole::Step;
 use crate::math::{Vec3, is_finite};
-use crate::model::{BuildError, Drives, Kind, Model, Settings, State, StepError};
+use crate::model::{BuildError, Drives, Kind, Model, State, StepError};
 
 /// Coordinates and ways within a step beyond this are refused: products of three would overflow.
 const FARTHEST: f64 = 1e100;
 
 /// What was pushed: sizes fit, everything is finite. Errors: `BadInput`, with body, index and value.
-pub fn check_inputs(
-    model: &Model,
-    state: &State,
-    drives: &Drives,
-    settings: &Settings,
-    dt: f64,
-) -> Result<(), StepError> {
+pub(super) fn check_inputs(step: &Step) -> Result<(), StepError> {
+    let Step { model, state, drives, settings, dt, .. } = step;
+    let dt = *dt;
     let fail = |index: usize, value: f64, message: &'static str| {
         Err(StepError::BadInput(BuildError { body: 0, index, value, message }))
     };

@@ -1,8 +1,38 @@
-//! A part of a step as a method leaves it.
+//! A part of a step as a method finds it, and as it leaves it.
 
-use crate::contact_search::{Contact, Hit};
+use crate::constraint::Metric;
+use crate::contact_search::{BodyFilter, Contact, Hit, Passing};
+use crate::fail_safe::Sweep;
 use crate::math::Vec3;
-use crate::model::State;
+use crate::model::{Segment, Settings, State, Watch};
+use crate::parallel::Par;
+
+/// A part of a step with all that a method answers it with.
+#[derive(Clone, Copy)]
+pub struct PartStart<'a> {
+    /// The part.
+    pub segment: Segment<'a>,
+    /// Its metric.
+    pub metric: &'a Metric,
+    /// Which bodies may touch.
+    pub filter: &'a BodyFilter,
+    /// Tangled vertices.
+    pub passing: &'a Passing,
+    /// Settings of the step.
+    pub settings: &'a Settings,
+    /// Where work runs.
+    pub par: Par<'a>,
+    /// Who watches.
+    pub watch: Watch<'a>,
+}
+
+impl<'a> PartStart<'a> {
+    /// What tests the ends of the part.
+    pub fn sweep(&self) -> Sweep<'a> {
+        let PartStart { segment, filter, passing, par, .. } = *self;
+        Sweep { segment, filter, passing, factor: self.settings.proximity_factor.max(1.0), par }
+    }
+}
 
 /// What a method gave a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

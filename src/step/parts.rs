@@ -3,13 +3,12 @@
 use super::account::{StepAccount, lap};
 use super::driven::{Driven, has_own_dynamics};
 use super::fall_back::{FallBack, fall_back};
-use super::part::PartEnd;
-use crate::constraint::Metric;
+use super::part::{PartEnd, PartStart};
+use super::whole::Step;
 use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing};
 use crate::dynamics::Accelerations;
 use crate::fail_safe::parts_of_step;
-use crate::model::{Model, Phase, Segment, Settings, StartPolicy, StepError, StepReport, Watch};
-use crate::parallel::Par;
+use crate::model::{Model, Phase, Segment, Settings, StartPolicy, StepError, StepReport};
 use std::time::Instant;
 
 /// How often the pairs of a pinch pass one by one before their bodies pass as a whole.
@@ -18,30 +17,13 @@ const PASSES_MAX: u32 = 16;
 /// Parts of a step, done and still to do, beyond which none is halved: bounds the work whatever a method asks for.
 const PARTS_MAX: u32 = 256;
 
-/// What stays the same over the parts of a step.
-#[derive(Clone, Copy)]
-pub struct Surroundings<'a> {
-    /// The metric.
-    pub metric: &'a Metric,
-    /// Which bodies may touch.
-    pub filter: &'a BodyFilter,
-    /// Settings of the step.
-    pub settings: &'a Settings,
-    /// Where work runs.
-    pub par: Par<'a>,
-    /// Who watches.
-    pub watch: Watch<'a>,
-}
-
 /// What a method does with one part of a step.
 pub trait PartMethod {
     /// Responds to the contacts of a part; the end is clean unless the method could not make it so. Counts, residuals and
     /// times are added to the report. Errors: cancelled.
     fn respond(
         &mut self,
-        around: &Surroundings,
-        segment: &Segment,
-        passing: &Passing,
+        part: &PartStart,
         search: &mut CandidateSearch,
         report: &mut StepReport,
     ) -> Result<PartEnd, StepError>;
@@ -60,39 +42,40 @@ pub trait PartMethod {
 
 /// Makes all parts of a step; the pairs that leave no room if it was pinched. Errors: cancelled, and what the dynamics
 /// of a part refuse.
-pub fn run_parts(
+pub(super) fn run_parts(
     method: &mut dyn PartMethod,
-    whole: &Surroundings,
-    undivided: &Segment,
+    step: &Step,
+    filter: &BodyFilter,
     driven: &Driven,
     accelerations: &Accelerations,
     passing: &mut Passing,
     search: &mut CandidateSearch,
     account: &mut StepAccount,
 ) -> Result<Option<Vec<Hit>>, StepError> {
-    let (settings, model) = (whole.settings, undivided.model);
-    let mut parts = parts_of_step(model, undivided.start, driven.drives(undivided.drives), settings, undivided.dt);
+    let Step { model, settings, par, watch, .. } = *step;
+    let undivided = step.segment();
+    let mut parts = parts_of_step(model, step.state, driven.drives(step.drives), settings, step.dt);
     let (mut passes, mut again) = (0, Driven::default());
     while let Some(part) = parts.pop() {
         let share = part.to - part.from;
         let here = account.state.clone();
-        let dt = share * undivided.dt;
-        let pushed = Segment { start: &here, from: part.from, to: part.to, dt, ..*undivided };
+        let dt = share * step.dt;
+        let pushed = Segment { start: &here, from: part.from, to: part.to, dt, ..undivided };
         // MODEL bodies are assembled again for a part of the step, HOST bodies go a part of their path.
         let mut clock = Instant::now();
         let anew = share < 1.0 && has_own_dynamics(model);
         if anew {
-            again.assign(&pushed, accelerations, whole.par)?;
+            again.assign(&pushed, accelerations, par)?;
         }
         let driven = if anew { &again } else { driven };
-        let segment = Segment { drives: driven.drives(undivided.drives), ..pushed };
-        let around = &Surroundings { metric: &driven.metric, ..*whole };
+        let segment = Segment { drives: driven.drives(step.drives), ..pushed };
+        let start = PartStart { segment, metric: &driven.metric, filter, passing, settings, par, watch };
         account.report.not_converged |= !driven.converged();
         account.report.times.dynamics += lap(&mut clock);
-        let end = method.respond(around, &segment, passing, search, &mut account.report)?;
+        let end = method.respond(&start, search, &mut account.report)?;
         if end.hits.is_empty() {
             method.keep(model, &end, dt, true);
-            account.add_part(model, around.metric, end, share, dt);
+            account.add_part(model, start.metric, end, share, dt);
             continue;
         }
         // Fail-safes: divide, zones, hold, pinched.
@@ -103,14 +86,14 @@ pub fn run_parts(
             continue;
         }
         clock = Instant::now();
-        around.watch.ask(Phase::FailSafe, part.from)?;
-        let outcome = fall_back(around, &segment, passing, end, method.has_zones(settings), search);
+        watch.ask(Phase::FailSafe, part.from)?;
+        let outcome = fall_back(&start, end, method.has_zones(settings), search);
         account.report.times.fail_safe += lap(&mut clock);
         match outcome {
             FallBack::Resolved { part: end, projected, rigid, held_vertices, momentum_taken } => {
                 method.keep(model, &end, dt, false);
                 account.add_fail_safe([projected, rigid, held_vertices], share, momentum_taken);
-                account.add_part(model, around.metric, *end, share, dt);
+                account.add_part(model, start.metric, *end, share, dt);
             }
             FallBack::Pinched { share: within, state: stopped, hits } => {
                 let passes_on = settings.start_policy == StartPolicy::Pass;

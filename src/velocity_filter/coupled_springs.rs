@@ -10,8 +10,8 @@ use crate::math::{
 };
 use crate::parallel::Par;
 
-/// Stiffness of a spring below its limit, in units of its contact's effective mass: it leaves of an approach what its impulse
-/// is by that.
+/// Stiffness of a spring below its limit, in units of its contact's effective mass: it leaves of an approach what its
+/// impulse is by that.
 const STIFFNESS: f64 = 10.0;
 
 /// Newton steps at most.
@@ -51,10 +51,10 @@ fn for_each_entry(rows: &RowSet, row: usize, mut told: impl FnMut(usize, Mat3)) 
 
 /// Gives the springs their impulses under the matrix of the metric, and the rows the change of velocity that these make.
 ///
-/// A spring gives in proportion to what it misses of the separation asked for, between nothing and its limit; friction likewise
-/// against sliding, within the coefficient times what the spring gives. With these limits fixed that is the lowest point of
-/// a convex function over `A`: Newton steps with a line search, after which they are renewed. Momentum holds to rounding. Cost: a few dozen
-/// products with A.
+/// A spring gives in proportion to what it misses of the separation asked for, between nothing and its limit; friction
+/// likewise against sliding, within the coefficient times what the spring gives. With these limits fixed that is the
+/// lowest point of a convex function over `A`: Newton steps with a line search, after which they are renewed. Momentum
+/// holds to rounding. Cost: a few dozen products with A.
 pub fn settle_coupled(stage: &mut StageRows, limits: &[f64], metric: &Metric, par: Par) {
     let n = metric.lumped.len();
     let product = |v: &[Vec3]| par.map_indexed(n, |i| metric.matrix.row_product(i, v));
@@ -199,8 +199,8 @@ impl<'a> Springs<'a> {
         direction
     }
 
-    /// How far to go along a direction until the function is nearly level; 0 unless it falls. `slope` and `curvature` are those of
-    /// the metric.
+    /// How far to go along a direction until the function is nearly level; 0 unless it falls. `slope` and `curvature`
+    /// are those of the metric.
     fn lowest(&self, direction: &[Vec3], slope: f64, curvature: f64) -> f64 {
         let speeds: Vec<Vec3> = (0..self.rows.len()).map(|row| self.rows.velocity(row, direction)).collect();
         let rise = |way: f64| {

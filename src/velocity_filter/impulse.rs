@@ -2,10 +2,10 @@
 
 use super::motion::FilteredMotion;
 use super::stage_rows::StageRows;
-use crate::contact_search::{BodyFilter, CandidateSearch, Contact, Hit, Passing, renewed_hits, swept_hits};
+use crate::contact_search::{CandidateSearch, Contact, Hit};
 use crate::math::Vec3;
-use crate::model::{Model, Phase, Segment, StepError, StepReport};
-use crate::step::{Surroundings, lap};
+use crate::model::{Model, Phase, StepError, StepReport};
+use crate::step::{PartStart, lap};
 use std::time::Instant;
 
 /// Gives impulses to what collides, pass by pass, until nothing does or the passes are used up; what is left.
@@ -14,30 +14,31 @@ use std::time::Instant;
 /// reflects its normal velocity by the restitution, and friction. It then tests again what has moved. Ends early where
 /// only pairs without finite mass collide, or none of the collisions approaches any more. Errors: cancelled.
 pub fn iterate_impulses(
-    around: &Surroundings,
-    segment: &Segment,
-    passing: &Passing,
+    part: &PartStart,
     motion: &mut FilteredMotion,
     search: &mut CandidateSearch,
     report: &mut StepReport,
 ) -> Result<Vec<Hit>, StepError> {
-    let filter = around.settings.filter;
-    let mut detection = Detection { around, segment, passing, hits: None, tested: Vec::new() };
+    let (sweep, filter) = (part.sweep(), part.settings.filter);
+    let (mut hits, mut tested): (Vec<Hit>, Vec<Vec3>) = Default::default();
     for pass in 1..=filter.passes_max + 1 {
-        around.watch.ask(Phase::Round, segment.from)?;
+        part.watch.ask(Phase::Round, part.segment.from)?;
         let mut clock = Instant::now();
-        detection.test(motion, search);
+        hits = match pass {
+            1 => sweep.hits(&motion.end, search),
+            _ => sweep.hits_again(&motion.end, (&tested, &hits), search),
+        };
+        tested.clone_from(&motion.end.positions);
         report.rounds += 1;
         report.times.detection += lap(&mut clock);
-        let hits = detection.hits.as_deref().unwrap_or_default();
         if hits.is_empty() || pass > filter.passes_max {
             break;
         }
-        let contacts = in_order_of_time(hits);
+        let contacts = in_order_of_time(&hits);
         let mut rows = motion.rows(&contacts);
         for row in 0..rows.len() {
             let contact = &contacts[rows.built.contact[row] as usize];
-            reflect(&mut rows, row, restitution(segment.model, contact, filter.restitution));
+            reflect(&mut rows, row, restitution(part.segment.model, contact, filter.restitution));
         }
         let given = motion.take(&contacts, pass, rows);
         report.iterations += given;
@@ -46,7 +47,7 @@ pub fn iterate_impulses(
             break;
         }
     }
-    Ok(detection.hits.unwrap_or_default())
+    Ok(hits)
 }
 
 /// Coefficient of restitution of a contact: of its materials, `least` at least.
@@ -71,34 +72,4 @@ fn in_order_of_time(hits: &[Hit]) -> Vec<Contact> {
     let mut order: Vec<&Hit> = hits.iter().collect();
     order.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.pair.cmp(&b.pair)));
     order.iter().map(|hit| hit.contact).collect()
-}
-
-/// Continuous detection over the passes of a part.
-struct Detection<'a> {
-    around: &'a Surroundings<'a>,
-    segment: &'a Segment<'a>,
-    passing: &'a Passing,
-    /// Hits of the last test; `None` before the first.
-    hits: Option<Vec<Hit>>,
-    /// End positions of the last test.
-    tested: Vec<Vec3>,
-}
-
-impl Detection<'_> {
-    /// Tests the motion: after the first time only pairs of which a vertex ends elsewhere than in the test before.
-    fn test(&mut self, motion: &FilteredMotion, search: &mut CandidateSearch) {
-        let (model, start, par) = (self.segment.model, self.segment.start, self.around.par);
-        let filter: &BodyFilter = self.around.filter;
-        let factor = self.around.settings.proximity_factor.max(1.0);
-        let x1 = &motion.end.positions;
-        let candidates = search.update(model, filter, &start.positions, x1, factor, par);
-        self.hits = Some(match self.hits.take() {
-            None => swept_hits(model, filter, self.passing, candidates, start, &motion.end, par),
-            Some(hits) => {
-                let moved: Vec<bool> = x1.iter().zip(&self.tested).map(|(now, then)| now != then).collect();
-                renewed_hits(model, filter, self.passing, candidates, (start, &motion.end), &hits, &moved, par)
-            }
-        });
-        self.tested.clone_from(x1);
-    }
 }

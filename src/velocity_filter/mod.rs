@@ -21,5 +21,5 @@ mod row_response;
 mod stage_rows;
 mod two_pass;
 
-pub use crate::step::Carried as Memory;
-pub use advance::{Scratch, advance, advance_watched};
+pub use crate::step::{Carried as Memory, Scratch};
+pub use advance::advance;

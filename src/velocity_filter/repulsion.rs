@@ -4,10 +4,9 @@ use super::coupled_springs::{effective_mass, settle_coupled};
 use super::motion::FilteredMotion;
 use super::row_response::WELL_WITHIN;
 use super::stage_rows::StageRows;
-use crate::constraint::Metric;
 use crate::contact_search::Contact;
 use crate::math::{Vec3, dot, scale};
-use crate::parallel::Par;
+use crate::step::PartStart;
 
 /// Share of the thickness that pairs may overlap without being pushed apart: what rests stays in touch, and keeps its
 /// friction, instead of hopping out of reach and falling back.
@@ -21,18 +20,14 @@ const SETTLED: f64 = 5e-3;
 
 /// Pushes the contacts apart that start closer than their thickness; how many were pushed.
 ///
-/// A spring gives `k d dt` at most: `d` is the overlap at the start, `stiffness` is k in units of the contact's effective
-/// mass over `dt^2`, so that 1 is a spring that makes up for the whole overlap within the part. It is capped: a pair is
-/// pushed until it separates by `recovery` times its overlap beyond a tenth of the thickness, and one that separates faster
-/// already is left alone. Friction acts within `mu` times what its spring gives. What they add to the kinetic energy is at
-/// most the sum of `lambda` times the speed asked for.
-pub fn repel(
-    motion: &mut FilteredMotion,
-    contacts: &[Contact],
-    stiffness: f64,
-    recovery: f64,
-    (metric, dt, par): (&Metric, f64, Par),
-) -> u32 {
+/// A spring gives `k d dt` at most: `d` is the overlap at the start, `repulsion_stiffness` is k in units of the
+/// contact's effective mass over `dt^2`, so that 1 is a spring that makes up for the whole overlap within the part. It
+/// is capped: a pair is pushed until it separates by `recovery_fraction` times its overlap beyond a tenth of the
+/// thickness, and one that separates faster already is left alone. Friction acts within `mu` times what its spring
+/// gives. What they add to the kinetic energy is at most the sum of `lambda` times the speed asked for.
+pub fn repel(motion: &mut FilteredMotion, contacts: &[Contact], part: &PartStart) -> u32 {
+    let (metric, dt, recovery) = (part.metric, part.segment.dt, part.settings.recovery_fraction);
+    let stiffness = part.settings.filter.repulsion_stiffness;
     if stiffness == 0.0 {
         return 0;
     }
@@ -49,7 +44,7 @@ pub fn repel(
     if is_coupled {
         let mass = |row: usize| effective_mass(&rows.built.rows, row, metric).unwrap_or(0.0);
         let limits: Vec<f64> = (0..rows.len()).map(|row| stiffness * overlap_speeds[row] * mass(row)).collect();
-        settle_coupled(&mut rows, &limits, metric, par);
+        settle_coupled(&mut rows, &limits, metric, part.par);
         return motion.take(contacts, 0, rows);
     }
     let limits: Vec<f64> = overlap_speeds
@@ -63,7 +58,8 @@ pub fn repel(
     motion.take(contacts, 0, rows)
 }
 
-/// Sweeps over all rows, there and back, until they have settled. A sweep of a row tells by how much it changes its velocity.
+/// Sweeps over all rows, there and back, until they have settled. A sweep of a row tells by how much it changes its
+/// velocity.
 fn settle(rows: &mut StageRows, mut sweep: impl FnMut(&mut StageRows, usize) -> f64) {
     let (count, mut first) = (rows.len(), 0.0);
     for number in 0..SWEEPS_MAX {
@@ -131,7 +127,8 @@ mod tests {
     use super::super::coupled_springs::tests::{chain, stage};
     use super::*;
 
-    /// A mass of 0.5 kg at 2 m/s that was pushed back too hard: it leaves as fast as it came, or faster by the work allowed.
+    /// A mass of 0.5 kg at 2 m/s that was pushed back too hard: it leaves as fast as it came, or faster by the work
+    /// allowed.
     #[test]
     fn impulses_that_have_not_settled_add_no_more_than_the_work_of_springs() {
         let metric = chain(1, 0.5, 0.0);

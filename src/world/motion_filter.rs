@@ -9,6 +9,7 @@ use crate::model::{
     StepReport, StepResult, Surface, Watch, Witness,
 };
 use crate::parallel::Par;
+use crate::step::Step;
 use crate::velocity_filter;
 use std::ops::Range;
 use std::sync::Arc;
@@ -216,17 +217,17 @@ impl MotionFilter {
         if matches!(motion, Motion::Towards(_)) {
             settings.filter = FilterSettings { passes_max: 0, repulsion_stiffness: 0.0, ..settings.filter };
         }
-        let outcome = velocity_filter::advance_watched(
-            &self.model,
-            &mut state,
-            &self.drives,
-            &mut self.memory,
-            &settings,
+        let step = Step {
+            model: &self.model,
+            state: &mut state,
+            drives: &self.drives,
+            settings: &settings,
             dt,
-            &mut self.result,
-            &mut self.scratch,
-            (par, watch),
-        );
+            result: &mut self.result,
+            par,
+            watch,
+        };
+        let outcome = velocity_filter::advance(step, &mut self.memory, &mut self.scratch);
         self.state = state;
         self.witnesses.clear();
         match outcome {

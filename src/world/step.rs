@@ -7,6 +7,7 @@ use crate::implicit_contact;
 use crate::math::ZERO;
 use crate::model::{BodyDescription, BuildError, Method, Model, Settings, State, StepError, StepReport, System, Watch};
 use crate::parallel::Par;
+use crate::step::Step;
 use crate::velocity_filter;
 
 /// A step that failed. When pinched, the world stands at the certified fraction and the report says how far.
@@ -52,15 +53,10 @@ impl World {
         self.witnesses.clear();
         self.check_pushed_starts(par)?;
         let World { model, state, drives, memory, result, scratch, filter_scratch, .. } = self;
-        let run = (par, watch);
+        let step = Step { model, state, drives, settings, dt, result, par, watch };
         let outcome = match settings.method {
-            Method::ImplicitContact => {
-                implicit_contact::advance_watched(model, state, drives, memory, settings, dt, result, scratch, run)
-            }
-            Method::VelocityFilter => {
-                let (memory, scratch) = (&mut memory.carried, filter_scratch);
-                velocity_filter::advance_watched(model, state, drives, memory, settings, dt, result, scratch, run)
-            }
+            Method::ImplicitContact => implicit_contact::advance(step, memory, scratch),
+            Method::VelocityFilter => velocity_filter::advance(step, &mut memory.carried, filter_scratch),
         };
         match outcome {
             Ok(report) => {

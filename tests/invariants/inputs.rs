@@ -100,19 +100,7 @@ fn an_indefinite_host_matrix_ends_in_finite_numbers() {
                 }
             }
         }
-        let (settings, dt) = (host.settings, host.dt);
-        let outcome = signorini::implicit_contact::advance(
-            &host.model,
-            &mut host.state,
-            &host.drives,
-            &mut host.memory,
-            &settings,
-            dt,
-            &mut host.result,
-            &mut host.scratch,
-            signorini::parallel::Par::Serial,
-        );
-        match outcome {
+        match host.advance(Par::Serial) {
             Ok(report) => {
                 assert_eq!(report.intersections, Some(0));
                 touched += u32::from(report.contacts > 0);

@@ -6,6 +6,7 @@ use signorini::kinematics::Pose;
 use signorini::math::{Mat3, Vec3, add, add_scaled, mat_vec};
 use signorini::model::*;
 use signorini::parallel::Par;
+use signorini::step::Step;
 use signorini::velocity_filter;
 use std::sync::Arc;
 
@@ -195,12 +196,10 @@ impl World {
     /// One step with the drives as they are.
     pub fn advance(&mut self, par: Par) -> Result<StepReport, StepError> {
         let World { model, state, drives, memory, settings, dt, result, scratch, filter_scratch, .. } = self;
+        let step = Step { model, state, drives, settings, dt: *dt, result, par, watch: Watch::default() };
         let report = match settings.method {
-            Method::ImplicitContact => advance(model, state, drives, memory, settings, *dt, result, scratch, par),
-            Method::VelocityFilter => {
-                let (memory, scratch) = (&mut memory.carried, filter_scratch);
-                velocity_filter::advance(model, state, drives, memory, settings, *dt, result, scratch, par)
-            }
+            Method::ImplicitContact => advance(step, memory, scratch),
+            Method::VelocityFilter => velocity_filter::advance(step, &mut memory.carried, filter_scratch),
         };
         self.velocities.clone_from(&self.result.end_velocities);
         report

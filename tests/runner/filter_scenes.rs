@@ -32,8 +32,8 @@ fn friction_slows_the_ribbon_and_holds_it() {
     assert!(ways.is_sorted_by(|a, b| *a > 1.1 * b), "{ways:?}");
 }
 
-/// The baseline of [Harmon10, §3.8] that answers scripts before all others: what its second pass pushes back into scripts is held, and
-/// nothing passes.
+/// The baseline of [Harmon10, §3.8] that answers scripts before all others: what its second pass pushes back into
+/// scripts is held, and nothing passes.
 #[test]
 fn two_passes_hold_what_one_answers() {
     let folder = Folder::new("two-pass");

@@ -49,7 +49,8 @@ fn jitter_and_threads() {
     assert_ne!(hash(&["--jitter", "4"]), hash(&["--jitter", "3"]));
 }
 
-/// The velocity filter by its name: another motion, as clean, and resumed with the same bits; the method is part of the run.
+/// The velocity filter by its name: another motion, as clean, and resumed with the same bits; the method is part of the
+/// run.
 #[test]
 fn the_filter_runs_and_goes_on_with_the_same_bits() {
     let folder = Folder::new("filter");

@@ -9,8 +9,9 @@ use super::stress_world::Scene;
 use super::support::clock::thread_seconds;
 use signorini::implicit_contact::{Memory, Scratch, advance};
 use signorini::math::{Vec3, add, is_finite, norm, scale, sub};
-use signorini::model::{Drives, Kind, Precision, StartPolicy, State, StepError, StepReport, StepResult};
+use signorini::model::{Drives, Kind, Precision, StartPolicy, State, StepError, StepReport, StepResult, Watch};
 use signorini::parallel::{Par, Pool};
+use signorini::step::Step;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What the runs came to.
@@ -105,17 +106,17 @@ impl Runner<'_> {
         }
         // The twin: a pool and an emptied scratch.
         let (twin_state, twin_memory) = &mut self.twin;
-        let twin = advance(
-            &scene.model,
-            twin_state,
-            &drives,
-            twin_memory,
-            &settings,
-            scene.dt,
-            &mut self.twin_result,
-            &mut Scratch::default(),
-            Par::Pool(&pools[number % pools.len()]),
-        );
+        let step = Step {
+            model: &scene.model,
+            state: twin_state,
+            drives: &drives,
+            settings: &settings,
+            dt: scene.dt,
+            result: &mut self.twin_result,
+            par: Par::Pool(&pools[number % pools.len()]),
+            watch: Watch::default(),
+        };
+        let twin = advance(step, twin_memory, &mut Scratch::default());
         if bits(twin_state) != bits(&self.state) || !same_outcome(&outcome, &twin) {
             return Err("other bits on a pool with emptied scratch".into());
         }
@@ -159,17 +160,17 @@ impl Runner<'_> {
     }
 
     fn advance(&mut self, drives: &Drives, settings: &signorini::model::Settings) -> Result<StepReport, StepError> {
-        advance(
-            &self.scene.model,
-            &mut self.state,
+        let step = Step {
+            model: &self.scene.model,
+            state: &mut self.state,
             drives,
-            &mut self.memory,
             settings,
-            self.scene.dt,
-            &mut self.result,
-            &mut self.scratch,
-            Par::Serial,
-        )
+            dt: self.scene.dt,
+            result: &mut self.result,
+            par: Par::Serial,
+            watch: Watch::default(),
+        };
+        advance(step, &mut self.memory, &mut self.scratch)
     }
 
     fn check(

@@ -4,8 +4,11 @@ use super::stress_parts::{Drive, Part, ball, block, cloth, plane};
 use super::stress_world::{Scene, assemble};
 use signorini::implicit_contact::{Memory, Scratch, advance};
 use signorini::math::{Vec3, norm};
-use signorini::model::{Drives, HalfSpace, Model, Settings, StartPolicy, State, StepError, StepReport, StepResult};
+use signorini::model::{
+    Drives, HalfSpace, Model, Settings, StartPolicy, State, StepError, StepReport, StepResult, Watch,
+};
 use signorini::parallel::Par;
+use signorini::step::Step;
 
 fn settings() -> Settings {
     Settings { certify: true, ..Settings::default() }
@@ -31,7 +34,8 @@ impl World {
 
     fn step(&mut self, model: &Model, drives: &Drives, settings: &Settings, dt: f64) -> Result<StepReport, StepError> {
         let World { state, memory, scratch, result } = self;
-        advance(model, state, drives, memory, settings, dt, result, scratch, Par::Serial)
+        let (par, watch) = (Par::Serial, Watch::default());
+        advance(Step { model, state, drives, settings, dt, result, par, watch }, memory, scratch)
     }
 }
 
@@ -285,8 +289,7 @@ fn bodies_come_and_go() {
     let full =
         || vec![cloth(4, 1.0), cloth(4, 1.0).at([0.05, 0.0, 0.03]), ball(0.2, 1, Drive::Rigid).at([0.0, 0.0, 0.3])];
     let scene = scene_of(full(), settings(), 0.01);
-    let mut memory = Memory::default();
-    let mut scratch = Scratch::default();
+    let mut world = World::new(&scene);
     let mut positions: Vec<(u64, Vec<Vec3>, signorini::kinematics::Pose)> = Vec::new();
     for step in 0..12_usize {
         let kept: Vec<usize> = (0..3).filter(|i| step % 4 != 3 || *i != step % 3).collect();
@@ -313,10 +316,9 @@ fn bodies_come_and_go() {
         for body in model.bodies.iter().filter(|b| b.blocks.len() == 2) {
             drives.velocities[body.blocks.start + 1] = [0.0; 3];
         }
-        let (mut result, s) = (StepResult::default(), settings());
-        let outcome =
-            advance(model, &mut state, &drives, &mut memory, &s, 0.01, &mut result, &mut scratch, Par::Serial);
-        let report = outcome.unwrap_or_else(|e| panic!("step {step}: {e:?}"));
+        world.state = state;
+        let outcome = world.step(model, &drives, &settings(), 0.01);
+        let (state, report) = (&world.state, outcome.unwrap_or_else(|e| panic!("step {step}: {e:?}")));
         assert_eq!(report.intersections, Some(0));
         for (i, body) in model.bodies.iter().enumerate() {
             positions.retain(|p| p.0 != body.description.key);
