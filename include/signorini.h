@@ -626,7 +626,8 @@
 #define SGN_SOLVER_AUGMENTED_LAGRANGIAN 4
 
 /**
- * Full constraint anticipation, a baseline of quadratic cost.
+ * Full constraint anticipation, a baseline of quadratic cost; beyond 32,768 rows (three per contact with friction)
+ * iterative anticipation stands in.
  */
 #define SGN_SOLVER_FULL_ANTICIPATION 5
 

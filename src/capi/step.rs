@@ -36,7 +36,8 @@ pub const SGN_SOLVER_LIGHT_ANTICIPATION: i32 = 2;
 pub const SGN_SOLVER_ACCELERATED_RELAXATION: i32 = 3;
 /// Augmented Lagrangian with preconditioned conjugate gradients.
 pub const SGN_SOLVER_AUGMENTED_LAGRANGIAN: i32 = 4;
-/// Full constraint anticipation, a baseline of quadratic cost.
+/// Full constraint anticipation, a baseline of quadratic cost; beyond 32,768 rows (three per contact with friction)
+/// iterative anticipation stands in.
 pub const SGN_SOLVER_FULL_ANTICIPATION: i32 = 5;
 
 /// Shape of the friction limit.

@@ -148,17 +148,15 @@ fn choose(
 ) -> Option<f64> {
     let max = task.settings.iterations_max;
     let run = match task.settings.solver {
-        SolverChoice::IterativeAnticipation | SolverChoice::LightAnticipation => {
-            let paper = task.settings.solver == SolverChoice::IterativeAnticipation;
-            let inner = if paper { Inner::Paper } else { Inner::Light };
-            let (run, paper_iterations) = iterative_anticipation::run(task, inner, at, max, buffers, work);
-            report.paper_iterations = paper_iterations;
-            run
-        }
+        SolverChoice::IterativeAnticipation => anticipate(task, Inner::Paper, at, buffers, work, report),
+        SolverChoice::LightAnticipation => anticipate(task, Inner::Light, at, buffers, work, report),
         SolverChoice::AugmentedLagrangian => {
             augmented_lagrangian::run(task, DirectNewton::new(task.problem), at, Turn::of(max), buffers, work)
         }
-        SolverChoice::FullAnticipation => full_anticipation::run(task, at, max, buffers, work),
+        SolverChoice::FullAnticipation => match full_anticipation::run(task, at, max, buffers, work) {
+            Some(run) => run,
+            None => anticipate(task, Inner::Paper, at, buffers, work, report),
+        },
         SolverChoice::AcceleratedRelaxation => {
             let control = Control { iterations_max: max, patience: u32::MAX, passes: Passes::Growing };
             accelerated_relaxation::run(task, coupled, at, control, buffers, work)
@@ -169,6 +167,20 @@ fn choose(
     report.iterations = run.iterations;
     report.converged = run.ending == Ending::Converged;
     run.error
+}
+
+fn anticipate(
+    task: &Task,
+    inner: Inner,
+    at: &mut Iterate,
+    buffers: &mut MeasureBuffers,
+    work: &mut Work,
+    report: &mut SolverReport,
+) -> Run {
+    let max = task.settings.iterations_max;
+    let (run, paper_iterations) = iterative_anticipation::run(task, inner, at, max, buffers, work);
+    report.paper_iterations = paper_iterations;
+    run
 }
 
 /// A short splitting start if asked for, relaxation with a pass an iteration, and where that is not enough the augmented
