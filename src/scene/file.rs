@@ -6,7 +6,7 @@ use super::motion::{FramesTable, Twist};
 use super::placement::{Copies, Placement};
 use super::settings::SettingsTable;
 use crate::math::Vec3;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// A scene file.
 #[derive(Clone, Debug, Deserialize)]
@@ -62,7 +62,7 @@ fn yes() -> bool {
 }
 
 /// An axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Up {
     Y,

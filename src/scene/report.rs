@@ -11,24 +11,11 @@ use std::collections::BTreeMap;
 /// What a run came to; one line of JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    pub scene: String,
-    pub title: String,
-    pub about: String,
-    pub method: MethodName,
-    pub fail_safe: FailSafeName,
-    /// Of every body, where it was chosen in place of the scene's.
-    pub friction: Option<f64>,
+    #[serde(flatten)]
+    pub facts: Facts,
     pub version: &'static str,
-    pub vertices: usize,
-    /// Of bodies that are not scripted.
-    pub free_vertices: usize,
-    pub tets: usize,
-    pub bodies: usize,
-    /// Steps that the state has behind it.
-    pub steps: u64,
     /// Steps that the figures are over: fewer when a run was resumed without the rows of its first part.
     pub steps_counted: u64,
-    pub dt: f64,
     pub duration: f64,
     pub contacts_max: u32,
     pub active_contacts_max: u32,
@@ -41,8 +28,6 @@ pub struct Report {
     pub failsafes: u64,
     /// Steps that ended early.
     pub pinched: u64,
-    /// Between which bodies, since the run began or was resumed.
-    pub pinches: Vec<Pinch>,
     /// Steps in which a solve stopped at its work cap.
     pub not_converged: u64,
     /// Certified, over all steps.
@@ -61,25 +46,8 @@ pub struct Report {
     pub kinetic_energy_end_per_kg: f64,
     pub elastic_energy_end: f64,
     pub bytes_max: u64,
-    pub threads: usize,
-    pub jitter: u64,
-    pub up: &'static str,
-    /// Offset of the half-space that faces up, if there is one.
-    pub floor: Option<f64>,
-    /// Half-spaces at the end: normal and offset.
-    pub planes: Vec<[f64; 4]>,
-    /// Names of the bodies of prescribed motion.
-    pub scripted: Vec<String>,
-    pub camera: Option<Vec3>,
-    pub look_at: Option<Vec3>,
     /// Where the bodies that bounds name have come.
     pub ends: Vec<End>,
-    pub frames: u64,
-    pub frames_per_second: f64,
-    /// State hash.
-    pub hash: String,
-    /// Whether the run was stopped before its last step.
-    pub interrupted: bool,
     pub bounds_broken: Vec<String>,
 }
 
@@ -103,38 +71,51 @@ pub struct End {
     pub speed: f64,
 }
 
-/// What the report needs besides the rows.
+/// What is known of a run besides the rows of its steps.
+#[derive(Clone, Debug, Serialize)]
 pub struct Facts {
     pub scene: String,
     pub title: String,
     pub about: String,
     pub method: MethodName,
     pub fail_safe: FailSafeName,
+    /// Of every body, where it was chosen in place of the scene's.
     pub friction: Option<f64>,
     pub vertices: usize,
+    /// Of bodies that are not scripted.
     pub free_vertices: usize,
     pub tets: usize,
     pub bodies: usize,
+    /// Steps that the state has behind it.
     pub steps: u64,
     /// Whether the bounds about the end count.
+    #[serde(skip)]
     pub whole: bool,
     pub dt: f64,
     /// `[kg]`
+    #[serde(skip)]
     pub mass: f64,
     pub threads: usize,
     pub jitter: u64,
     pub up: Up,
+    /// Offset of the half-space that faces up, if there is one.
     pub floor: Option<f64>,
+    /// Half-spaces at the end: normal and offset.
     pub planes: Vec<[f64; 4]>,
+    /// Names of the bodies of prescribed motion.
     pub scripted: Vec<String>,
     pub camera: Option<Vec3>,
     pub look_at: Option<Vec3>,
+    /// Between which bodies steps were pinched, since the run began or was resumed.
     pub pinches: Vec<Pinch>,
     pub frames: u64,
     pub frames_per_second: f64,
-    pub hash: u64,
+    /// State hash.
+    pub hash: String,
+    /// Whether the run was stopped before its last step.
     pub interrupted: bool,
     /// Of the bodies that bounds name: at the start and at the end.
+    #[serde(skip)]
     pub centres: Vec<[Centre; 2]>,
 }
 
@@ -156,20 +137,8 @@ impl Report {
         let last = rows.last().cloned().unwrap_or_default();
         let sum = |f: &dyn Fn(&StepRow) -> f64| rows.iter().map(f).sum::<f64>();
         let mut report = Report {
-            scene: facts.scene,
-            title: facts.title,
-            about: facts.about,
-            method: facts.method,
-            fail_safe: facts.fail_safe,
-            friction: facts.friction,
             version: env!("CARGO_PKG_VERSION"),
-            vertices: facts.vertices,
-            free_vertices: facts.free_vertices,
-            tets: facts.tets,
-            bodies: facts.bodies,
-            steps: facts.steps,
             steps_counted: rows.len() as u64,
-            dt: facts.dt,
             duration: facts.steps as f64 * facts.dt,
             contacts_max: rows.iter().map(|r| r.contacts).max().unwrap_or(0),
             active_contacts_max: rows.iter().map(|r| r.active_contacts).max().unwrap_or(0),
@@ -178,7 +147,6 @@ impl Report {
             divisions: count(&|r| r.parts > 1),
             failsafes: count(&StepRow::fail_safe_used),
             pinched: count(&|r| r.certified_fraction < 1.0),
-            pinches: facts.pinches,
             not_converged: count(&|r| r.not_converged > 0),
             intersections: rows.iter().map(|r| u64::from(r.intersections)).sum(),
             residual_max: residuals.iter().copied().fold(0.0, f64::max),
@@ -202,22 +170,11 @@ impl Report {
             kinetic_energy_end_per_kg: if facts.mass > 0.0 { last.kinetic_energy / facts.mass } else { 0.0 },
             elastic_energy_end: last.elastic_energy,
             bytes_max: rows.iter().map(|r| r.bytes).max().unwrap_or(0),
-            threads: facts.threads,
-            jitter: facts.jitter,
-            up: if facts.up == Up::Y { "y" } else { "z" },
-            floor: facts.floor,
-            planes: facts.planes,
-            scripted: facts.scripted,
-            camera: facts.camera,
-            look_at: facts.look_at,
             ends: bounds.body.iter().zip(&facts.centres).map(End::of).collect(),
-            frames: facts.frames,
-            frames_per_second: facts.frames_per_second,
-            hash: format!("{:016x}", facts.hash),
-            interrupted: facts.interrupted,
             bounds_broken: Vec::new(),
+            facts,
         };
-        report.bounds_broken = broken(&report, bounds, facts.whole);
+        report.bounds_broken = broken(&report, bounds);
         report
     }
 }
@@ -231,7 +188,7 @@ impl End {
 }
 
 /// The bounds that a run broke, each with the number that broke it.
-fn broken(report: &Report, bounds: &Bounds, whole: bool) -> Vec<String> {
+fn broken(report: &Report, bounds: &Bounds) -> Vec<String> {
     let mut checks = vec![
         at_most("intersections", report.intersections as f64, Some(0.0)),
         at_most("contacts_max", f64::from(report.contacts_max), bounds.contacts_max.map(f64::from)),
@@ -241,7 +198,7 @@ fn broken(report: &Report, bounds: &Bounds, whole: bool) -> Vec<String> {
         at_most("not_converged_max", report.not_converged as f64, bounds.not_converged_max.map(f64::from)),
         at_least("rounds_within_three_min", report.rounds_within_three, bounds.rounds_within_three_min),
     ];
-    if whole {
+    if report.facts.whole {
         checks.push(at_least("contacts_min", f64::from(report.contacts_max), bounds.contacts_min.map(f64::from)));
         checks.push(at_most("kinetic_energy_end_max", report.kinetic_energy_end_per_kg, bounds.kinetic_energy_end_max));
         checks.push(at_least("pinched_min", report.pinched as f64, bounds.pinched_min.map(f64::from)));

@@ -385,7 +385,7 @@ impl<'a> Run<'a> {
             pinches: std::mem::take(&mut self.pinches),
             frames: if self.options.out.is_some() { frames } else { 0 },
             frames_per_second: rate,
-            hash: self.scene.world.state_hash(),
+            hash: format!("{:016x}", self.scene.world.state_hash()),
             interrupted,
             centres: self.starts.drain(..).zip(ends).map(|(start, end)| [start, end]).collect(),
         };
@@ -421,8 +421,9 @@ fn planes(scene: &Scene) -> Vec<[f64; 4]> {
 }
 
 fn summary(report: &Report) -> String {
+    let facts = &report.facts;
     let rounds: Vec<String> = report.cmr_rounds_histogram.iter().map(|(r, n)| format!("{r}: {n}")).collect();
-    let pinches: Vec<String> = report
+    let pinches: Vec<String> = facts
         .pinches
         .iter()
         .map(|p| {
@@ -449,12 +450,12 @@ fn summary(report: &Report) -> String {
          {} intersections (certified, all steps); largest residual {:.2e}\n\
          seconds a step: mean {:.4}, median {:.4}, p95 {:.4}, max {:.4}; of the processor: median {:.4}, p95 {:.4}{}{}\n\
          hash {}",
-        report.scene,
-        report.vertices,
-        report.tets,
-        report.bodies,
-        report.steps,
-        report.dt,
+        facts.scene,
+        facts.vertices,
+        facts.tets,
+        facts.bodies,
+        facts.steps,
+        facts.dt,
         report.contacts_max,
         rounds.join(", "),
         report.divisions,
@@ -471,7 +472,7 @@ fn summary(report: &Report) -> String {
         p.p95,
         pinches.concat(),
         ends.concat(),
-        report.hash,
+        facts.hash,
     )
 }
 
