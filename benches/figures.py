@@ -80,7 +80,8 @@ def plot(path, series, title):
 def anticipation(out):
     """Fig. 6, left: full against iterative anticipation on the same steps, without friction; then with friction."""
     series = {}
-    for name, words in {"without friction": ["friction=0"], "friction 0.4": ["friction=0.4", "contacts=1500"]}.items():
+    cases = {"without friction": ["friction=0"], "friction 0.4": ["friction=0.4", "contacts=3000", "steps=20", "every=3"]}
+    for name, words in cases.items():
         path = out / f"anticipation_{words[0].split('=')[1]}.csv"
         bench("anticipation", path, *words)
         table = rows(path)
