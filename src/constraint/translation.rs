@@ -75,6 +75,17 @@ impl Translations {
         missing.iter().zip(&self.inverse_masses).map(|(r, m)| mat_vec(m, *r)).collect()
     }
 
+    /// The component that block `b` belongs to.
+    pub fn component(&self, b: usize) -> Option<usize> {
+        let c = self.component[b];
+        (c != NONE).then_some(c as usize)
+    }
+
+    /// Inverse masses of the components under translation `[1/kg]`.
+    pub fn inverse_masses(&self) -> &[Mat3] {
+        &self.inverse_masses
+    }
+
     /// Adds the translation of its component to each block; returns the largest.
     pub fn translate(&self, shifts: &[Vec3], dv: &mut [Vec3]) -> f64 {
         for (v, component) in dv.iter_mut().zip(&self.component).filter(|(_, c)| **c != NONE) {

@@ -176,7 +176,9 @@ pub(super) fn run(
     let tolerance = task.settings.contact_tolerance.min(task.settings.velocity_tolerance);
     let double = |at: &Iterate, scale| Engine::Double(Box::new(DoubleRelaxation::new(task, coupled, at, scale)));
     let mut engine = if tolerance >= SINGLE_FROM {
-        Engine::Single(Box::new(SingleRelaxation::new(task, coupled, at, FIRST_SCALE)))
+        // What conflicts with whole bodies that give way is tried without in the next turn.
+        let level = control.passes == Passes::One;
+        Engine::Single(Box::new(SingleRelaxation::new(task, coupled, at, FIRST_SCALE, level)))
     } else {
         double(at, FIRST_SCALE)
     };

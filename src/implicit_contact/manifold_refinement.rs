@@ -204,7 +204,7 @@ fn solve_round(
         velocity_scale,
     };
     let report = if velocity_scale > 0.0 {
-        solve_balanced(&problem, metric, &built, &mut impulses, &mut dv, &settings, solver, part.par)
+        solve_balanced(&problem, metric, &mut impulses, &mut dv, &settings, solver, part.par)
     } else {
         // Nothing moves and no row asks for anything.
         impulses.fill([0.0; 3]);
@@ -249,7 +249,6 @@ fn iterations_left(max: u32, done: u32) -> u32 {
 fn solve_balanced(
     problem: &ContactProblem,
     metric: &Metric,
-    built: &BuiltRows,
     impulses: &mut [Vec3],
     dv: &mut [Vec3],
     settings: &Settings,
@@ -258,12 +257,10 @@ fn solve_balanced(
 ) -> SolverReport {
     let mut settings = *settings;
     let mut total = SolverReport::default();
-    let mut product = vec![[0.0; 3]; dv.len()];
     for _ in 0..BALANCES_MAX {
         let report = solve(problem, impulses, dv, &settings, scratch, par);
-        let given = block_impulses(dv.len(), built, impulses);
-        problem.matrix.product(dv, &mut product, par);
-        let moved = metric.translations.translate(&metric.translations.missing(&given, &product), dv);
+        let (product, given) = scratch.balance();
+        let moved = metric.translations.translate(&metric.translations.missing(given, product), dv);
         // A row weighs both its sides with one at most.
         let off = 2.0 * moved / problem.velocity_scale;
         total = SolverReport {

@@ -13,6 +13,7 @@
 //! * `incidence`: the contacts of each block
 //! * `single_pass`: the relaxation pass in single precision, over the contacts that are near
 //! * `single_relaxation`, `double_relaxation`: iterations of the default solver in either precision
+//! * `translation_level`: whole components that give way in them
 //! * `friction`: the local solve of one contact
 //! * `residuals`: natural map, dynamics residual
 //! * `velocity_error`: the estimate that decides when to stop
@@ -43,6 +44,7 @@ mod single_pass;
 mod single_relaxation;
 mod splitting_start;
 mod stop_test;
+mod translation_level;
 mod velocity_error;
 
 pub use advance::{Scratch, advance};

@@ -182,8 +182,17 @@ impl PackedContacts {
 
     /// Local metric of contact `c` for the block-diagonal metric with this inverse.
     pub fn metric(&self, c: usize, rows: &RowSet, inverse: &[Mat3]) -> LocalMetric {
-        let contact = &self.contacts[c];
-        LocalMetric::new(frame_metric(&contact.frame, &world_metric(rows, contact, inverse)))
+        LocalMetric::new(self.in_frame(c, &self.world_metric(c, rows, inverse)))
+    }
+
+    /// `W S^-1 W^T` of contact `c`, world frame.
+    pub fn world_metric(&self, c: usize, rows: &RowSet, inverse: &[Mat3]) -> Mat3 {
+        world_metric(rows, &self.contacts[c], inverse)
+    }
+
+    /// `R G R^T` of contact `c` for a symmetric G, as its upper triangle.
+    pub fn in_frame(&self, c: usize, g: &Mat3) -> [f64; 6] {
+        frame_metric(&self.contacts[c].frame, g)
     }
 
     /// Local metrics of all contacts.

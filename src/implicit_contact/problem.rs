@@ -69,6 +69,13 @@ pub struct SolverScratch {
     measure: MeasureBuffers,
 }
 
+impl SolverScratch {
+    /// `A dv` and `C^T p` of what the last solve returned.
+    pub(super) fn balance(&self) -> (&[Vec3], &[Vec3]) {
+        (&self.measure.product, &self.measure.contact)
+    }
+}
+
 /// Solves the problem with the solver that the settings choose.
 ///
 /// `impulses` holds a warm start on entry (zero for new contacts) and the multipliers on return; `dv` likewise.

@@ -137,6 +137,8 @@ pub(super) struct MeasureBuffers {
     pub product: Vec<Vec3>,
     /// `C^T p` of the last call.
     pub contact: Vec<Vec3>,
+    /// The iterate last judged, with its momentum balanced.
+    pub balanced: Vec<Vec3>,
 }
 
 /// All residuals of an iterate, from `dv` and `p` alone. Cost: one product with A and one pass over the contacts.
@@ -159,13 +161,14 @@ pub(super) fn measure(task: &Task, at: &Iterate, buffers: &mut MeasureBuffers, w
 /// `|A dv - C^T p| / |C^T p|` in the norm of the inverse diagonal, from `A dv` and `C^T p`.
 pub(super) fn dynamics_residual(task: &Task, product: &[Vec3], contact: &[Vec3]) -> f64 {
     let inverse = task.problem.inverse_diagonal;
-    let norm_squared = |f: &(dyn Fn(usize) -> Vec3 + Sync)| {
-        task.par.sum(product.len(), |b| {
-            let v = f(b);
-            dot(v, mat_vec(&inverse[b], v))
-        })
+    let square = |b: usize, v: Vec3| dot(v, mat_vec(&inverse[b], v));
+    let count = product.len();
+    let sums = |k: usize| {
+        let blocks = k * BLOCK..count.min((k + 1) * BLOCK);
+        blocks.fold([0.0; 2], |s, b| [s[0] + square(b, sub(product[b], contact[b])), s[1] + square(b, contact[b])])
     };
-    let residual = norm_squared(&|b| sub(product[b], contact[b])).sqrt();
-    let scale = norm_squared(&|b| contact[b]).sqrt().max(task.impulse_floor);
-    if residual == 0.0 { 0.0 } else { residual / scale }
+    let mut total = [0.0; 2];
+    task.par.fold_tasks(0..count.div_ceil(BLOCK), sums, |s| total = [total[0] + s[0], total[1] + s[1]]);
+    let [residual, scale] = total;
+    if residual == 0.0 { 0.0 } else { residual.sqrt() / scale.sqrt().max(task.impulse_floor) }
 }

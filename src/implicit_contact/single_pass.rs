@@ -8,10 +8,11 @@
 
 use super::friction::{LocalMetric, project};
 use super::packed_contacts::{PackedContacts, contact_velocity};
+use super::translation_level::{Sides, TranslationLevel};
 use crate::constraint::RowSet;
 use crate::linalg::power_of_two;
 use crate::math::simd::{Kernel, Quad, run_wide};
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Vec3, mat_add};
 use crate::model::FrictionCone;
 use std::ops::Range;
 
@@ -49,6 +50,9 @@ struct Record {
     inverse: [f32; 4],
     /// Position in `general`, or `NONE`.
     general: u32,
+    /// The components on its sides, and its compliance without them.
+    sides: Sides,
+    compliance: f64,
     /// The contact, and the base that the target belongs to.
     contact: u32,
     base: u32,
@@ -72,6 +76,7 @@ pub(super) struct SinglePass<'a> {
     records: Vec<Record>,
     record_of: Vec<u32>,
     general: GeneralRows,
+    level: TranslationLevel,
     /// Records to relax, by contact.
     near: Vec<u32>,
     /// Columns of the inverse blocks of the metric, and the same in double precision.
@@ -86,7 +91,12 @@ pub(super) struct SinglePass<'a> {
 
 impl<'a> SinglePass<'a> {
     /// Takes over the contacts; `mass` is a power of two, `velocity` typical of the problem.
-    pub fn new(packed: &'a PackedContacts, rows: &'a RowSet, mass: f64, velocity: f64) -> SinglePass<'a> {
+    pub fn new(
+        packed: &'a PackedContacts,
+        rows: &'a RowSet,
+        level: TranslationLevel,
+        (mass, velocity): (f64, f64),
+    ) -> SinglePass<'a> {
         let velocity = power_of_two(velocity);
         let screens = packed.contacts.iter().map(|contact| {
             let n = contact.frame[0];
@@ -101,6 +111,7 @@ impl<'a> SinglePass<'a> {
             records: Vec::new(),
             record_of: vec![NONE; packed.contacts.len()],
             general: GeneralRows::default(),
+            level,
             near: Vec::new(),
             inverse: Vec::new(),
             exact_inverse: Vec::new(),
@@ -126,6 +137,10 @@ impl<'a> SinglePass<'a> {
         self.inverse.clear();
         self.inverse.extend(inverse.iter().map(|a| [0, 1, 2].map(|c| Quad::round([a[0][c], a[1][c], a[2][c]], m))));
         self.exact_inverse = inverse;
+        self.measure_records();
+    }
+
+    fn measure_records(&mut self) {
         for i in 0..self.records.len() {
             self.records[i] = self.measured(self.records[i]);
         }
@@ -134,7 +149,12 @@ impl<'a> SinglePass<'a> {
     /// The record with the local metric of its contact.
     fn measured(&self, mut record: Record) -> Record {
         let m = self.mass;
-        let metric = self.packed.metric(record.contact as usize, self.rows, &self.exact_inverse);
+        let c = record.contact as usize;
+        let own = self.packed.world_metric(c, self.rows, &self.exact_inverse);
+        let [normal, _, _, a, _, b] = self.packed.in_frame(c, &own);
+        let rubs = record.normal[3] > 0.0;
+        record.compliance = if rubs { 3.0 / (1.0 / normal + 1.0 / a + 1.0 / b) } else { normal };
+        let metric = LocalMetric::new(self.packed.in_frame(c, &mat_add(&own, &self.level.metric(&record.sides))));
         let LocalMetric { entries, normal_inverse, tangent_inverse, tangent_step } = metric;
         let [nn, n1, n2, a, b, c] = entries.map(|g| (m * g) as f32);
         let [i, j, k] = tangent_inverse.map(|g| (g / m) as f32);
@@ -142,6 +162,24 @@ impl<'a> SinglePass<'a> {
         record.tangent = [a, b, c, (tangent_step / m) as f32];
         record.inverse = [i, j, k, (normal_inverse / m) as f32];
         record
+    }
+
+    /// The second level of the metric.
+    pub fn level(&self) -> &TranslationLevel {
+        &self.level
+    }
+
+    /// The same, to go on from an iteration to the next.
+    pub fn level_mut(&mut self) -> &mut TranslationLevel {
+        &mut self.level
+    }
+
+    /// Weighs the second level by the contacts that are near.
+    pub fn weigh(&mut self) {
+        let near = self.near.iter().map(|r| &self.records[*r as usize]);
+        if self.level.weigh(near.map(|r| (&r.sides, r.compliance))) {
+            self.measure_records();
+        }
     }
 
     /// Starts from multipliers: those that press are near.
@@ -190,6 +228,7 @@ impl<'a> SinglePass<'a> {
                 rows: f.map(|v| Quad::round(v, 1.0)),
                 columns: [0, 1, 2].map(|axis| Quad::round([f[0][axis], f[1][axis], f[2][axis]], 1.0)),
                 general: NONE,
+                sides: self.level.sides(self.rows, contact.source as usize),
                 contact: c as u32,
                 ..Record::default()
             };
@@ -256,8 +295,8 @@ impl<'a> SinglePass<'a> {
 
     /// Relaxes the near contacts one after the other against the increments `u`; returns the contacts visited.
     pub fn pass(&mut self, cone: FrictionCone, u: &mut [Quad]) -> u64 {
-        let SinglePass { records, general, near, inverse, .. } = self;
-        let sweep = Sweep { records, general, near, inverse, u, disc: cone == FrictionCone::Disc };
+        let SinglePass { records, general, near, inverse, level, .. } = self;
+        let sweep = Sweep { records, general, near, inverse, level, u, disc: cone == FrictionCone::Disc };
         run_wide(sweep);
         self.near.len() as u64
     }
@@ -284,6 +323,7 @@ struct Sweep<'a> {
     general: &'a GeneralRows,
     near: &'a [u32],
     inverse: &'a [[Quad; 3]],
+    level: &'a mut TranslationLevel,
     u: &'a mut [Quad],
     disc: bool,
 }
@@ -295,9 +335,9 @@ impl Kernel for Sweep<'_> {
         for r in self.near {
             let r = &mut self.records[*r as usize];
             if self.disc {
-                r.relax::<true>(self.general, self.inverse, self.u);
+                r.relax::<true>(self.general, self.inverse, self.level, self.u);
             } else {
-                r.relax::<false>(self.general, self.inverse, self.u);
+                r.relax::<false>(self.general, self.inverse, self.level, self.u);
             }
         }
     }
@@ -305,9 +345,16 @@ impl Kernel for Sweep<'_> {
 
 impl Record {
     #[inline(always)]
-    fn relax<const DISC: bool>(&mut self, general: &GeneralRows, inverse: &[[Quad; 3]], u: &mut [Quad]) {
+    fn relax<const DISC: bool>(
+        &mut self,
+        general: &GeneralRows,
+        inverse: &[[Quad; 3]],
+        level: &mut TranslationLevel,
+        u: &mut [Quad],
+    ) {
         let simple = self.general == NONE;
-        let seen = if simple { seen(&self.blocks, &self.weights, u) } else { general.seen(self.general, u) };
+        let own = if simple { seen(&self.blocks, &self.weights, u) } else { general.seen(self.general, u) };
+        let seen = own + level.seen(&self.sides);
         let before = self.p;
         let w = (Quad::combine(&self.columns, seen) + self.target).lanes();
         if self.pressure == 0.0 && w[0] >= 0.0 {
@@ -316,6 +363,7 @@ impl Record {
         let after = self.step::<DISC>(before.lanes(), w);
         (self.p, self.pressure) = (Quad::new(after), after[0]);
         let f = Quad::combine(&self.rows, self.p - before);
+        level.respond(&self.sides, f);
         if simple {
             for (b, w) in self.blocks.iter().zip(self.weights) {
                 let b = *b as usize;

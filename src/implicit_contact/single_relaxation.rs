@@ -6,6 +6,7 @@ use super::residuals::{
     Iterate, MeasureBuffers, Residuals, Task, Work, contact_residuals, dynamics_residual, near_residuals,
 };
 use super::single_pass::SinglePass;
+use super::translation_level::TranslationLevel;
 use crate::linalg::SinglePrecision;
 use crate::math::simd::{Kernel, Quad, run_wide};
 use crate::math::{self, Vec3, mat_scale};
@@ -45,10 +46,12 @@ pub(super) struct SingleRelaxation<'a, 'b> {
 }
 
 impl<'a, 'b> SingleRelaxation<'a, 'b> {
-    /// Starts from `at` with this scale of the metric.
-    pub fn new(task: &'b Task<'a>, coupled: &'b [bool], at: &Iterate, metric_scale: f64) -> Self {
+    /// Starts from `at` with this scale of the metric, with or without its second level.
+    pub fn new(task: &'b Task<'a>, coupled: &'b [bool], at: &Iterate, metric_scale: f64, level: bool) -> Self {
         let blocks = at.dv.len();
-        let contacts = SinglePass::new(task.packed, task.problem.rows, task.single.unit(), task.velocity_scale);
+        let mass = task.single.unit();
+        let level = TranslationLevel::new(task.problem.translations.filter(|_| level), blocks, mass);
+        let contacts = SinglePass::new(task.packed, task.problem.rows, level, (mass, task.velocity_scale));
         let mut r = SingleRelaxation {
             task,
             contacts,
@@ -68,12 +71,12 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
         let mut forces = vec![[0.0; 3]; blocks];
         task.packed.scatter(task.problem.rows, r.contacts.near(), &at.p, &mut forces);
         r.renew_base();
-        let unit = 1.0 / (task.single.unit() * r.contacts.velocity_unit());
-        let inverse = r.contacts.inverse();
-        task.par.map_into(&mut r.u, |b| {
-            let a = task.problem.matrix.row_product(b, &at.dv);
-            Quad::combine(&inverse[b], Quad::round(math::sub(forces[b], a), unit))
-        });
+        r.screen();
+        r.contacts.weigh();
+        let unit = 1.0 / (mass * r.contacts.velocity_unit());
+        let product = |b: usize| task.problem.matrix.row_product(b, &at.dv);
+        let gradient = task.par.map_indexed(blocks, |b| Quad::round(math::sub(forces[b], product(b)), unit));
+        r.extrapolate((0.0, 1.0), Some(&gradient));
         r.work.blocks += task.problem.matrix.values.len() as u64;
         r
     }
@@ -102,13 +105,15 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
             for _ in 0..passes {
                 self.work.contacts += self.contacts.pass(self.task.settings.friction_cone, &mut self.u);
             }
+            self.contacts.level_mut().settle(&mut self.u);
             let sums = self.product();
             if self.momentum.observe(sums) {
                 self.set_scale();
             }
             self.iteration += 1;
             if i < iterations {
-                self.extrapolate(None);
+                let step = self.momentum.next();
+                self.extrapolate(step, None);
             }
         }
     }
@@ -122,14 +127,15 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
 
     /// `A dv'` and the sums that steer step and momentum.
     fn product(&mut self) -> Sums {
-        let matrix = self.task.single;
+        let (matrix, level) = (self.task.single, self.contacts.level());
         let (u, nodes, block_scale) = (&self.u[..], &self.nodes[..], &self.block_scale[..]);
         let mut total = Sums::default();
         self.task.par.fold_tasks(
             self.a_u.chunks_mut(BLOCK).enumerate(),
-            |(i, out)| run_wide(Product { matrix, u, nodes, block_scale, start: i * BLOCK, out }),
+            |(i, out)| run_wide(Product { matrix, u, nodes, block_scale, level, start: i * BLOCK, out }),
             |sums| total = total.plus(&sums),
         );
+        self.contacts.level_mut().observe(&self.a_u);
         self.work.blocks += self.task.problem.matrix.values.len() as u64;
         total
     }
@@ -170,24 +176,27 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
             *node = Node { dv: node.dv - *u, a_dv: node.a_dv - *a_u, z: node.z - *u, a_z: node.a_z - *a_u };
             (*u, *a_u) = Default::default();
         }
+        self.contacts.level_mut().renew();
+        self.contacts.weigh();
         let unit = 1.0 / (self.task.single.unit() * self.contacts.velocity_unit());
         let gradient: Vec<Quad> = self
             .task
             .par
             .map_indexed(self.u.len(), |b| Quad::round(math::sub(buffers.contact[b], buffers.product[b]), unit));
-        self.extrapolate(Some(&gradient));
+        let step = self.momentum.next();
+        self.extrapolate(step, Some(&gradient));
     }
 
     /// The next prediction. `gradient` is `C^T p - A base` where that is known; else it follows from the prediction that
     /// was relaxed.
-    fn extrapolate(&mut self, gradient: Option<&[Quad]>) {
-        let (beta, change) = self.momentum.next();
-        let (a_u, inverse) = (&self.a_u[..], self.contacts.inverse());
+    fn extrapolate(&mut self, (beta, change): (f64, f64), gradient: Option<&[Quad]>) {
+        let (beta, change) = (beta as f32, change as f32);
+        self.contacts.level_mut().predict(beta, gradient);
+        let (a_u, inverse, level) = (&self.a_u[..], self.contacts.inverse(), self.contacts.level());
         let coupled = self.momentum.coupled;
         let chunks = self.nodes.chunks_mut(BLOCK).zip(self.u.chunks_mut(BLOCK));
-        let (beta, change) = (beta as f32, change as f32);
         let block = |(i, (nodes, u)): (usize, (&mut [Node], &mut [Quad]))| {
-            run_wide(Extrapolate { nodes, u, a_u, inverse, gradient, coupled, beta, change, start: i * BLOCK });
+            run_wide(Extrapolate { nodes, u, a_u, inverse, level, gradient, coupled, beta, change, start: i * BLOCK });
         };
         self.task.par.fold_tasks(chunks.enumerate(), block, |()| {});
     }
@@ -213,6 +222,7 @@ struct Product<'a> {
     u: &'a [Quad],
     nodes: &'a [Node],
     block_scale: &'a [f32],
+    level: &'a TranslationLevel,
     start: usize,
     out: &'a mut [Quad],
 }
@@ -227,7 +237,9 @@ impl Kernel for Product<'_> {
             let (node, u) = (&self.nodes[b], self.u[b]);
             *y = self.matrix.rounded_row_product(b, self.u);
             let e = u - node.z;
-            let se = self.matrix.diagonal_product(b, e).scaled(self.block_scale[b]);
+            // The metric of both levels maps the step to what S maps its share of the first level to.
+            let own = e - self.level.shift(b);
+            let se = self.matrix.diagonal_product(b, own).scaled(self.block_scale[b]);
             curvature = curvature + e * (*y - node.a_z);
             metric = metric + e * se;
             turn = turn - se * (u - node.dv);
@@ -241,6 +253,7 @@ struct Extrapolate<'a> {
     u: &'a mut [Quad],
     a_u: &'a [Quad],
     inverse: &'a [[Quad; 3]],
+    level: &'a TranslationLevel,
     gradient: Option<&'a [Quad]>,
     coupled: &'a [bool],
     beta: f32,
@@ -260,12 +273,13 @@ impl Kernel for Extrapolate<'_> {
             let response = match self.gradient {
                 Some(q) => Quad::combine(&self.inverse[b], q[b] - a_z),
                 None => {
-                    let step = (*u - node.z).scaled(if self.coupled[b] { self.change } else { 1.0 });
+                    let step =
+                        (*u - node.z - self.level.before(b)).scaled(if self.coupled[b] { self.change } else { 1.0 });
                     step + Quad::combine(&self.inverse[b], node.a_z - a_z)
                 }
             };
             *node = Node { dv: *u, a_dv: a_u, z, a_z };
-            *u = z + response;
+            *u = z + response + self.level.shift(b);
         }
     }
 }

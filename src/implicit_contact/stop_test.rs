@@ -78,34 +78,34 @@ impl StopTest {
         self.ratio *= 0.9;
         if passed && self.ratio * residuals.dynamics <= tolerance {
             // The cheaper question first: rows that do not hold with momentum balanced take more iterations anyway.
-            best.clone_from(now);
-            if !balanced(task, best, buffers, work) {
-                best.clone_from(now);
+            if !balanced(task, now, buffers, work) {
                 return Verdict::Continue;
             }
             let error = velocity_error(task, now, residuals, tolerance, buffers, work);
             if error <= tolerance {
+                best.p.clone_from(&now.p);
+                best.dv.clone_from(&buffers.balanced);
                 return Verdict::Converged(error);
             }
-            best.clone_from(now);
             self.ratio = error / residuals.dynamics.max(f64::MIN_POSITIVE);
         }
         Verdict::Continue
     }
 }
 
-/// Translates what is coupled by the momentum that it lacks, the softest mode, which solvers that go from block to block
-/// find last; whether the rows still hold.
-fn balanced(task: &Task, at: &mut Iterate, buffers: &MeasureBuffers, work: &mut Work) -> bool {
+/// Translates what is coupled by the momentum that it lacks, the softest mode; whether the rows still hold.
+fn balanced(task: &Task, at: &Iterate, buffers: &mut MeasureBuffers, work: &mut Work) -> bool {
+    let MeasureBuffers { product, contact, balanced, .. } = buffers;
+    balanced.clone_from(&at.dv);
     let Some(translations) = task.problem.translations else { return true };
-    let moved = translations.translate(&translations.missing(&buffers.contact, &buffers.product), &mut at.dv);
+    let moved = translations.translate(&translations.missing(contact, product), balanced);
     let tolerance = task.settings.contact_tolerance;
     // A row weighs both its sides with one at most.
     if 2.0 * moved <= ROUNDING * tolerance * task.velocity_scale {
         return true;
     }
     work.contacts += at.p.len() as u64;
-    contact_residuals(task, &at.dv, &at.p).contact() <= tolerance
+    contact_residuals(task, balanced, &at.p).contact() <= tolerance
 }
 
 /// Watches residuals for stagnation: the iterations since one of them was last halved.
