@@ -1,6 +1,7 @@
 //! Candidate pairs of a segment, kept over rounds and steps while every vertex stays in the box they were found for.
 
 use super::pair::BodyFilter;
+use crate::detection::intersection::{Intersection, find_with};
 use crate::detection::{BroadPhase, Candidates, Primitives};
 use crate::geometry::Aabb;
 use crate::math::{Vec3, is_finite};
@@ -14,8 +15,6 @@ pub struct CandidateSearch {
     broad_phase: Option<(u64, BroadPhase)>,
     candidates: Candidates,
     anchor: Option<Anchor>,
-    /// Only its edge-face pairs are used.
-    certificate: Candidates,
 }
 
 /// What the present candidates were found for.
@@ -92,18 +91,16 @@ impl CandidateSearch {
         &self.candidates
     }
 
-    /// Edge-face pairs whose boxes overlap at `x`, by the same tree.
-    pub fn edge_faces(&mut self, model: &Model, filter: &BodyFilter, x: &[Vec3], par: Par) -> &[[u32; 2]] {
-        let broad_phase = tree(&mut self.broad_phase, model);
-        broad_phase.refit(x, x, &[], par);
-        broad_phase.edge_face_candidates(&|a, b| allowed(model, filter, a, b), &mut self.certificate, par);
-        &self.certificate.edge_face
+    /// Edges and faces that share a point at `x`, by the same tree and exactly.
+    pub fn crossings(&mut self, model: &Model, filter: &BodyFilter, x: &[Vec3], par: Par) -> Vec<Intersection> {
+        let allowed = |a, b| allowed(model, filter, a, b);
+        find_with(tree(&mut self.broad_phase, model), &primitives(model), x, &allowed, par)
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let c = &self.candidates;
-        8 * (c.vertex_face.capacity() + c.edge_edge.capacity() + self.certificate.edge_face.capacity())
+        8 * (c.vertex_face.capacity() + c.edge_edge.capacity())
             + self.anchor.as_ref().map_or(0, |a| 48 * a.boxes.capacity())
     }
 }

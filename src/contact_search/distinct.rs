@@ -133,3 +133,98 @@ impl Borders {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::pair::Pair;
+    use super::*;
+
+    /// Vertices that count on each side, sorted.
+    fn sides(c: &Contact) -> [Vec<u32>; 2] {
+        let mut out = [false, true].map(|second| {
+            let own = (0..4).filter(|k| c.weights[*k] != 0.0 && c.on_second(*k) == second);
+            own.map(|k| c.vertices[k]).collect::<Vec<u32>>()
+        });
+        out.iter_mut().for_each(|side| side.sort_unstable());
+        out
+    }
+
+    /// The rule as it is told, each contact against each.
+    fn by_brute_force(contacts: &[Contact]) -> Vec<Contact> {
+        let is_border = |[a, b]: &[Vec<u32>; 2]| a.len() + b.len() <= 3;
+        let mut kept: Vec<Contact> = Vec::new();
+        for c in contacts {
+            let [a, b] = sides(c);
+            let same = kept.iter_mut().rev().find_map(|k| {
+                let [p, q] = sides(k);
+                let turned = if p == a && q == b { 1.0 } else { -1.0 };
+                ((p == a && q == b) || (p == b && q == a)).then_some((turned, k))
+            });
+            match same.filter(|_| is_border(&[a, b])) {
+                Some((turned, k)) if turned * dot(k.normal, c.normal) > 0.5 => {
+                    k.thickness = k.thickness.max(c.thickness);
+                }
+                _ => kept.push(*c),
+            }
+        }
+        // Whether a face at the border is nearer to its only vertex on one side.
+        let nearer = |c: &Contact, from: &[u32], border: &[u32]| {
+            let of_vertex = contacts.iter().filter(|f| f.pair.kind == PairKind::VertexFace && from == &f.vertices[..1]);
+            of_vertex.filter(|f| f.start_gap < c.start_gap).any(|f| border.iter().all(|v| f.vertices[1..].contains(v)))
+        };
+        kept.retain(|c| {
+            let [a, b] = sides(c);
+            let slides = |from: &[u32], border: &[u32]| from.len() == 2 || nearer(c, from, border);
+            !(is_border(&[a.clone(), b.clone()]) && slides(&a, &b) && slides(&b, &a))
+        });
+        kept
+    }
+
+    #[test]
+    fn same_contacts_as_by_brute_force() {
+        let mut state = 1_u64;
+        let mut pick = |n: u64| {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) % n
+        };
+        let mut shorter = 0;
+        for round in 0..300 {
+            // Few vertices, so that borders are shared and nearly every slot of the table is asked for.
+            let vertices = 5 + round % 9;
+            let mut contacts: Vec<Contact> = (0..3 + round % 40)
+                .map(|i| {
+                    let kind = if pick(2) == 0 { PairKind::VertexFace } else { PairKind::EdgeEdge };
+                    let mut named = Vec::new();
+                    while named.len() < 4 {
+                        let v = pick(vertices) as u32;
+                        if !named.contains(&v) {
+                            named.push(v);
+                        }
+                    }
+                    let first = if kind == PairKind::VertexFace { 1 } else { 2 };
+                    let mut weights = [0.0; 4];
+                    // One vertex of each side counts at least.
+                    weights[pick(first) as usize] = 1.0;
+                    weights[first as usize + pick(4 - first) as usize] = -1.0;
+                    weights.iter_mut().filter(|w| **w == 0.0).for_each(|w| *w = [0.0, 0.0, 0.5][pick(3) as usize]);
+                    Contact {
+                        pair: Pair { kind, features: [i as u32, 0] },
+                        ordinal: 0,
+                        vertices: [named[0], named[1], named[2], named[3]],
+                        weights,
+                        normal: [0.0, 0.0, [1.0, -1.0][pick(2) as usize]],
+                        offset: 0.0,
+                        thickness: pick(5) as f64,
+                        start_gap: pick(5) as f64,
+                    }
+                })
+                .collect();
+            contacts.sort_by_key(|c| c.pair);
+            let (expected, all) = (by_brute_force(&contacts), contacts.len());
+            distinct(&mut contacts, Par::Serial);
+            assert_eq!(contacts, expected, "round {round}");
+            shorter += usize::from(contacts.len() < all);
+        }
+        assert!(shorter > 150, "{shorter}");
+    }
+}

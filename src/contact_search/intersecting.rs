@@ -1,11 +1,10 @@
 //! Exact intersections of a state with witnesses, the tangled components they make, and the sweep between two states.
 
-use super::candidates::{CandidateSearch, primitives};
+use super::candidates::CandidateSearch;
 use super::near::{half_space_pair, half_spaces};
 use super::pair::BodyFilter;
 use super::passing::Passing;
 use super::swept::{Hit, swept_hits};
-use crate::detection::intersection;
 use crate::geometry::{edge_edge, point_triangle};
 use crate::math::predicates::{plane_side, segment_meets_triangle};
 use crate::math::{Vec3, add_scaled, dot};
@@ -39,8 +38,7 @@ pub fn intersections_with(
 ) -> Tangle {
     let mut tangle = Tangle::default();
     let body_of = |v: u32| model.vertex_body[v as usize] as usize;
-    let pairs = search.edge_faces(model, filter, &state.positions, par);
-    for found in intersection::among(&primitives(model), pairs, &state.positions, par) {
+    for found in search.crossings(model, filter, &state.positions, par) {
         let (edge, face) = (model.edges[found.edge as usize], model.faces[found.face as usize]);
         let bodies = [body_of(edge[0]), body_of(face[0])];
         if bodies[0] == bodies[1] && touches_at_rest(model, edge, face) {

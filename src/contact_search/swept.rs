@@ -79,13 +79,15 @@ pub fn renewed_hits(
     par: Par,
 ) -> Vec<Hit> {
     let touches = |vertices: &[u32]| vertices.iter().any(|v| moved[*v as usize]);
-    let pairs = |list: &[[u32; 2]], kind: PairKind| -> Vec<[u32; 2]> {
-        let own = list.iter().filter(|features| touches(&Pair { kind, features: **features }.vertices(model)));
-        own.copied().collect()
+    let faces = par.map_indexed(model.faces.len(), |f| touches(&model.faces[f]));
+    let edges = par.map_indexed(model.edges.len(), |e| touches(&model.edges[e]));
+    let pairs = |list: &[[u32; 2]], first: &[bool], second: &[bool]| -> Vec<[u32; 2]> {
+        let touched = |[a, b]: [u32; 2]| first[a as usize] || second[b as usize];
+        par.filter_indexed(list.len(), |i| touched(list[i]).then_some(list[i]))
     };
     let open = Candidates {
-        vertex_face: pairs(&candidates.vertex_face, PairKind::VertexFace),
-        edge_edge: pairs(&candidates.edge_edge, PairKind::EdgeEdge),
+        vertex_face: pairs(&candidates.vertex_face, moved, &faces),
+        edge_edge: pairs(&candidates.edge_edge, &edges, &edges),
         ..Candidates::default()
     };
     let mut hits = swept_hits(model, filter, passing, &open, start, end, par);

@@ -21,11 +21,15 @@ const TASK: usize = 64;
 /// The tree is rebuilt when its branches have grown this much against the boxes of its leaves.
 const DECAY: f64 = 1.5;
 
+/// Moves the pairs to keep to the front of a list and says how many they are.
+pub type Screen<'a> = dyn Fn(&mut [[u32; 2]]) -> usize + Sync + 'a;
+
 /// Which pairs a traversal collects.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Wanted {
+#[derive(Clone, Copy)]
+enum Wanted<'a> {
     Contacts,
-    EdgeFace,
+    /// Those that the screen keeps.
+    EdgeFace(&'a Screen<'a>),
 }
 
 /// A tree over the primitives of a model: built once, refitted to every motion.
@@ -184,10 +188,13 @@ impl BroadPhase {
         unite(&mut out.edge_edge, &mut found);
     }
 
-    /// Edge-face pairs whose boxes overlap, that share no vertex, and that the filter lets pass; sorted.
-    pub fn edge_face_candidates(&self, filter: &Filter, out: &mut Candidates, par: Par) {
-        let [edge_face, _] = self.traverse(Wanted::EdgeFace, None, filter, par);
-        merge(edge_face, self.edges.len(), &mut out.edge_face, par);
+    /// Edge-face pairs whose boxes overlap, that share no vertex, and that the filter lets pass: what the screen keeps of
+    /// them, sorted. It sees each pair once, in lists that depend on the tree alone.
+    pub fn edge_face_candidates(&self, filter: &Filter, screen: &Screen, par: Par) -> Vec<[u32; 2]> {
+        let [edge_face, _] = self.traverse(Wanted::EdgeFace(screen), None, filter, par);
+        let mut pairs: Vec<[u32; 2]> = edge_face.iter().flat_map(PairBuffer::pairs).copied().collect();
+        pairs.sort_unstable();
+        pairs
     }
 
     /// One vertex of a component, for the filter.
@@ -196,11 +203,17 @@ impl BroadPhase {
     }
 
     /// All pairs of leaves, or those with a leaf that is `awake`.
-    fn traverse(&self, wanted: Wanted, awake: Option<&[bool]>, filter: &Filter, par: Par) -> [PairLists; 2] {
+    fn traverse<'a>(&'a self, wanted: Wanted<'a>, awake: Option<&[bool]>, filter: &Filter, par: Par) -> [PairLists; 2] {
         let count = self.leaves.len();
         let task = |start: usize| Task { tree: self, wanted, awake, filter, leaves: start..count.min(start + TASK) };
         let mut tasks: Vec<_> = (0..count).step_by(TASK).map(|i| (task(i), Found::default())).collect();
-        par.for_each_task(&mut tasks, |(task, found)| *found = run_eight(task.clone()));
+        par.for_each_task(&mut tasks, |(task, found)| {
+            *found = run_eight(task.clone());
+            // While the pairs are in the processor's cache.
+            if let Wanted::EdgeFace(screen) = wanted {
+                found.0.keep(screen);
+            }
+        });
         tasks.into_iter().map(|(_, found)| found).unzip().into()
     }
 }
@@ -209,7 +222,7 @@ impl BroadPhase {
 #[derive(Clone)]
 struct Task<'a> {
     tree: &'a BroadPhase,
-    wanted: Wanted,
+    wanted: Wanted<'a>,
     awake: Option<&'a [bool]>,
     filter: &'a Filter<'a>,
     leaves: Range<usize>,
@@ -235,7 +248,7 @@ impl EightKernel for Task<'_> {
             for b in near.iter().filter(|b| **b >= a || sleeps(**b)) {
                 match self.wanted {
                     Wanted::Contacts => self.contacts(eight, a, *b, &mut found),
-                    Wanted::EdgeFace => self.edge_faces(eight, a, *b, &mut found),
+                    Wanted::EdgeFace(_) => self.edge_faces(eight, a, *b, &mut found),
                 }
             }
         }

@@ -37,9 +37,12 @@ impl PackedBox {
     pub fn of_lanes(low: &Rows, high: &Rows) -> PackedBox {
         let mut out = PackedBox::EMPTY;
         for k in 0..3 {
-            // Where a comparison with NaN is false, the neutral element stays.
-            let mut smallest = low[k].map(|x| if x < f32::INFINITY { x } else { f32::INFINITY });
-            let mut largest = high[k].map(|x| if x > f32::NEG_INFINITY { x } else { f32::NEG_INFINITY });
+            let (mut smallest, mut largest) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
+            for i in 0..8 {
+                // Where a comparison with NaN is false, the neutral element stays.
+                smallest[i] = if low[k][i] < smallest[i] { low[k][i] } else { smallest[i] };
+                largest[i] = if high[k][i] > largest[i] { high[k][i] } else { largest[i] };
+            }
             for width in [4, 2, 1] {
                 for i in 0..width {
                     let (a, b) = (smallest[i + width], largest[i + width]);

@@ -7,20 +7,21 @@
 //! about their common edge), and wires that touch wires. A state does not tell whether these have passed through
 //! something; continuous detection does.
 
-use super::primitives::{Candidates, Filter, Primitives};
+use super::primitives::{Filter, Primitives};
+use super::screening::{COARSE_ERROR, Coarse};
 use super::{BroadPhase, Motion, brute_force};
 use crate::geometry::{edge_edge, point_triangle};
 use crate::math::predicates::{plane_side, segment_meets_triangle};
-use crate::math::simd::points::{self, Point, gather, largest};
-use crate::math::simd::{Kernel, Lanes, run_wide};
+use crate::math::simd::points::{self, Point, gather, gather_quads, largest};
+use crate::math::simd::{Kernel, Lanes, Number, run_wide};
 use crate::math::{Vec3, add_scaled, cross, dot, lerp, sub};
 use crate::parallel::Par;
 
-/// Pairs per task.
-const TASK: usize = 4096;
-
-/// Pairs side by side.
+/// Pairs side by side in double precision.
 const WIDTH: usize = 4;
+
+/// Pairs side by side in single precision.
+const COARSE_WIDTH: usize = 8;
 
 /// An edge and a face that share a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,98 +51,135 @@ pub fn find_with(
     par: Par,
 ) -> Vec<Intersection> {
     broad_phase.refit(x, x, &[], par);
-    let mut candidates = Candidates::default();
-    broad_phase.edge_face_candidates(filter, &mut candidates, par);
-    among(primitives, &candidates.edge_face, x, par)
+    let coarse = Coarse::new(x, None, &[], par);
+    let rule_out = |pairs: &mut [[u32; 2]]| run_wide(RuleOut { primitives, x, coarse: &coarse.x0, pairs });
+    let open = broad_phase.edge_face_candidates(filter, &rule_out, par);
+    par.filter_indexed(open.len(), |i| decide(primitives, open[i], x))
 }
 
 /// [`find`] over all pairs, each decided exactly without a filter: its oracle. Cost: quadratic.
 pub fn find_brute_force(primitives: &Primitives, x: &[Vec3], filter: &Filter) -> Vec<Intersection> {
     let motion = Motion { x0: x, x1: x, radius: &[] };
     let candidates = brute_force::edge_face_candidates(primitives, &motion, filter);
-    let decide = |pair: &[u32; 2]| intersection(*pair, &vertices(primitives, *pair).map(|v| x[v]));
-    candidates.edge_face.iter().filter_map(decide).collect()
+    candidates.edge_face.iter().filter_map(|pair| decide(primitives, *pair, x)).collect()
 }
 
-/// Those of the edge-face pairs that share a point at `x`, in their order. Exact; cost: linear.
-pub fn among(primitives: &Primitives, pairs: &[[u32; 2]], x: &[Vec3], par: Par) -> Vec<Intersection> {
-    let mut tasks: Vec<(&[[u32; 2]], Vec<Intersection>)> = pairs.chunks(TASK).map(|p| (p, Vec::new())).collect();
-    par.for_each_task(&mut tasks, |(pairs, found)| run_wide(Task { primitives, pairs, x, found }));
-    tasks.into_iter().flat_map(|(_, found)| found).collect()
-}
-
-/// Some of the edge-face pairs.
-struct Task<'a> {
+/// Moves the edge-face pairs that may share a point to the front of a list; how many they are. Single precision rules out
+/// most of the others, double precision what is too close for it.
+struct RuleOut<'a> {
     primitives: &'a Primitives<'a>,
-    pairs: &'a [[u32; 2]],
     x: &'a [Vec3],
-    found: &'a mut Vec<Intersection>,
+    /// Moved and scaled to the unit cube, see [`Coarse`].
+    coarse: &'a [[f32; 4]],
+    pairs: &'a mut [[u32; 2]],
 }
 
-impl Kernel for Task<'_> {
-    type Output = ();
+impl Kernel for RuleOut<'_> {
+    type Output = usize;
 
     #[inline(always)]
-    fn run(self) {
-        for chunk in self.pairs.chunks(WIDTH) {
-            // Lanes beyond the last pair repeat the first one.
-            let mut corners = [vertices(self.primitives, chunk[0]); WIDTH];
-            for (v, pair) in corners.iter_mut().zip(chunk) {
-                *v = vertices(self.primitives, *pair);
-            }
-            let margin = margin(&gather(self.x, &corners));
-            for (l, pair) in chunk.iter().enumerate() {
-                let apart = margin.0[l] > 0.0;
-                if !apart {
-                    self.found.extend(intersection(*pair, &corners[l].map(|v| self.x[v])));
-                }
-            }
-        }
+    fn run(self) -> usize {
+        let (x, coarse) = (self.x, self.coarse);
+        let open = compact(self.primitives, self.pairs, |v: &[[usize; 5]; COARSE_WIDTH]| {
+            margin(&gather_quads(coarse, v).0, &SINGLE).0
+        });
+        compact(self.primitives, &mut self.pairs[..open], |v: &[[usize; 5]; WIDTH]| margin(&gather(x, v), &DOUBLE).0)
     }
+}
+
+/// Moves the pairs whose margin is not greater than zero, `L` side by side, to the front; how many they are.
+#[inline(always)]
+fn compact<const L: usize, T: Number>(
+    primitives: &Primitives,
+    pairs: &mut [[u32; 2]],
+    margin: impl Fn(&[[usize; 5]; L]) -> [T; L],
+) -> usize {
+    let (mut start, mut filled) = (0, 0);
+    while start < pairs.len() {
+        let width = L.min(pairs.len() - start);
+        // Lanes beyond the last pair repeat it.
+        let mut group = [pairs[start]; L];
+        let mut corners = [[0; 5]; L];
+        for l in 0..L {
+            group[l] = pairs[start + l.min(width - 1)];
+            corners[l] = vertices(primitives, group[l]);
+        }
+        let margin = margin(&corners);
+        for l in 0..width {
+            // What is not a number stays open.
+            let apart = margin[l] > T::ZERO;
+            pairs[filled] = group[l];
+            filled += 1 - usize::from(apart);
+        }
+        start += width;
+    }
+    filled
 }
 
 /// `p q a b c` of an edge and a face.
 #[inline(always)]
 fn vertices(primitives: &Primitives, [edge, face]: [u32; 2]) -> [usize; 5] {
     let ([p, q], [a, b, c]) = (primitives.edges[edge as usize], primitives.faces[face as usize]);
-    [p, q, a, b, c].map(|v| v as usize)
+    [p as usize, q as usize, a as usize, b as usize, c as usize]
 }
 
 /// The exact decision on one pair.
 #[inline(never)]
-fn intersection([edge, face]: [u32; 2], [p, q, a, b, c]: &[Vec3; 5]) -> Option<Intersection> {
-    let (p, q, a, b, c) = (*p, *q, *a, *b, *c);
+fn decide(primitives: &Primitives, pair: [u32; 2], x: &[Vec3]) -> Option<Intersection> {
+    let [p, q, a, b, c] = vertices(primitives, pair).map(|v| x[v]);
+    let [edge, face] = pair;
     segment_meets_triangle(p, q, a, b, c).then(|| Intersection { edge, face, point: common_point(p, q, a, b, c) })
 }
+
+/// How far a computed `n·x` may be off, for two that are compared: by `(absolute + relative M) |n|_1`, M the extent.
+struct Rounding<T> {
+    absolute: T,
+    relative: T,
+    /// Sizes of `|n|_1 M` whose products stay clear of the ends of the number format; others decide nothing.
+    sizes: [T; 2],
+}
+
+/// Positions are the doubles given: each `n·x` is off by less than `5 u |n|_1 M` with u the unit roundoff.
+const DOUBLE: Rounding<f64> = Rounding { absolute: 0.0, relative: 8.0 * f64::EPSILON, sizes: [1e-250, 1e250] };
+
+/// Positions are within the unit cube, each coordinate off by u at most, differences of them by 2 u and one rounding
+/// more: each `n·x` by less than `(2 u + 6 u M) |n|_1`.
+const SINGLE: Rounding<f32> = Rounding { absolute: COARSE_ERROR, relative: 8.0 * f32::EPSILON, sizes: [1e-30, 1e30] };
 
 /// Greater than zero where a direction certainly separates the segment `p q` from the triangle `a b c`: the normal of
 /// the triangle's plane, and in that plane those of the triangle's edges and of the segment.
 #[inline(always)]
-fn margin<const L: usize>([p, q, a, b, c]: &[Point<L>; 5]) -> Lanes<L> {
+fn margin<const L: usize, T: Number>([p, q, a, b, c]: &[Point<L, T>; 5], rounding: &Rounding<T>) -> Lanes<L, T> {
     let all = [points::sub(p, a), points::sub(q, a), points::sub(b, a), points::sub(c, a)];
     let [p, q, b, c] = &all;
     let extent = largest(p).max(largest(q)).max(largest(b).max(largest(c)));
+    let error = Lanes::splat(rounding.absolute) + Lanes::splat(rounding.relative) * extent;
     let normal = points::cross(b, c);
-    let mut best = separation(&normal, &all, extent);
+    let mut best = separation(&normal, &all, extent, error, rounding.sizes);
     for along in [*b, *c, points::sub(c, b), points::sub(q, p)] {
-        best = best.max(separation(&points::cross(&normal, &along), &all, extent));
+        best = best.max(separation(&points::cross(&normal, &along), &all, extent, error, rounding.sizes));
     }
     best
 }
 
 /// Greater than zero where the direction n, whatever it is, certainly has the segment's ends `p q` on one side of the
-/// triangle's corners: 0, b and c.
-///
-/// With u the unit roundoff and M the extent, each `n·x` is off by less than `5 u |n|_1 M`, of which two are compared.
+/// triangle's corners: 0, b and c. `error` is that of a [`Rounding`] for each unit of `|n|_1`.
 #[inline(always)]
-fn separation<const L: usize>(n: &Point<L>, [p, q, b, c]: &[Point<L>; 4], extent: Lanes<L>) -> Lanes<L> {
-    let (zero, size) = (Lanes::splat(0.0), (n[0].abs() + n[1].abs() + n[2].abs()) * extent);
+fn separation<const L: usize, T: Number>(
+    n: &Point<L, T>,
+    [p, q, b, c]: &[Point<L, T>; 4],
+    extent: Lanes<L, T>,
+    error: Lanes<L, T>,
+    [smallest, greatest]: [T; 2],
+) -> Lanes<L, T> {
+    let (zero, length) = (Lanes::splat(T::ZERO), n[0].abs() + n[1].abs() + n[2].abs());
     let (np, nq, nb, nc) = (points::dot(n, p), points::dot(n, q), points::dot(n, b), points::dot(n, c));
     let above = np.min(nq) - zero.max(nb).max(nc);
     let below = zero.min(nb).min(nc) - np.max(nq);
-    // Sizes whose products leave the range of doubles decide nothing.
-    let in_range = (size - Lanes::splat(1e-250)).min(Lanes::splat(1e250) - size);
-    (above.max(below) - size * Lanes::splat(8.0 * f64::EPSILON)).min(in_range)
+    let size = length * extent;
+    let in_range = (size - Lanes::splat(smallest)).min(Lanes::splat(greatest) - size);
+    // NaN last: the smaller of two is the second where one is not a number.
+    in_range.min(above.max(below) - length * error)
 }
 
 /// A point of the segment that is nearest to the triangle they meet in, to rounding.

@@ -56,7 +56,11 @@ impl<const N: usize> Block<N> {
 
     #[inline(always)]
     pub fn corners(&self, lane: usize) -> [u32; N] {
-        std::array::from_fn(|k| self.corners[k][lane])
+        let mut corners = [0; N];
+        for k in 0..N {
+            corners[k] = self.corners[k][lane];
+        }
+        corners
     }
 
     /// The box of all lanes.

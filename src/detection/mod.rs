@@ -22,5 +22,5 @@ mod primitives;
 pub mod proximity;
 pub mod screening;
 
-pub use broad_phase::BroadPhase;
+pub use broad_phase::{BroadPhase, Screen};
 pub use primitives::{Candidates, Filter, Motion, Primitives};

@@ -30,7 +30,14 @@ impl PairBuffer {
         self.pairs.resize((2 * self.pairs.len()).max(512), [0; 2]);
     }
 
-    fn pairs(&self) -> &[[u32; 2]] {
+    /// Keeps the pairs that `screen` moves to the front, as many as it says, and the memory for these alone.
+    pub fn keep(&mut self, screen: impl FnOnce(&mut [[u32; 2]]) -> usize) {
+        self.used = screen(&mut self.pairs[..self.used]);
+        self.pairs.truncate(self.used);
+        self.pairs.shrink_to_fit();
+    }
+
+    pub fn pairs(&self) -> &[[u32; 2]] {
         &self.pairs[..self.used]
     }
 }

@@ -21,8 +21,11 @@ const WIDTH: usize = 4;
 /// Pairs side by side in single precision.
 const COARSE_WIDTH: usize = 8;
 
-/// No candidate.
-const NONE: u32 = u32::MAX;
+/// Positions bounded in one task.
+const PART: usize = 8192;
+
+/// Pairs screened in one task.
+const BLOCK: usize = 4096;
 
 /// Margin of rounding of distances from elsewhere, relative: what is ruled out here is ruled out there.
 const SLACK: f64 = 1e-9;
@@ -32,7 +35,7 @@ const COARSE_SLACK: f32 = 1e-4;
 
 /// Rounding of `n·D` in single precision, for a difference of size one of points within the unit cube: of its
 /// coordinates (a half unit in the last place each), and of the product.
-const COARSE_ERROR: f32 = 8.0 * UNIT_ROUNDOFF;
+pub(super) const COARSE_ERROR: f32 = 8.0 * UNIT_ROUNDOFF;
 
 /// The same for each unit of the sizes of all differences together.
 const COARSE_DIRECTION_ERROR: f32 = 32.0 * UNIT_ROUNDOFF;
@@ -103,8 +106,17 @@ impl Lists<'_> {
 
     /// Leaves those of the ascending numbers that the screen does not rule out.
     fn rule_out<const L: usize, S: Screen<L>>(&self, screen: &S, numbers: &mut Vec<u32>, par: Par) {
-        par.for_each_block(numbers, |_, numbers| run_wide(Block::<L, S> { lists: *self, screen, numbers }));
-        numbers.retain(|n| *n != NONE);
+        let mut blocks: Vec<(&mut [u32], usize)> = numbers.chunks_mut(BLOCK).map(|block| (block, 0)).collect();
+        par.for_each_task(&mut blocks, |(numbers, left)| {
+            *left = run_wide(Block::<L, S> { lists: *self, screen, numbers });
+        });
+        let left: Vec<usize> = blocks.into_iter().map(|(_, left)| left).collect();
+        let mut filled = 0;
+        for (block, left) in left.into_iter().enumerate() {
+            numbers.copy_within(block * BLOCK..block * BLOCK + left, filled);
+            filled += left;
+        }
+        numbers.truncate(filled);
     }
 
     #[inline(always)]
@@ -126,7 +138,7 @@ impl Lists<'_> {
     }
 }
 
-/// Some of the numbers; those of pairs left open go to the front, [`NONE`] behind them.
+/// Some of the numbers; those of pairs left open go to the front, and it is told how many they are.
 struct Block<'a, const L: usize, S> {
     lists: Lists<'a>,
     screen: &'a S,
@@ -134,15 +146,14 @@ struct Block<'a, const L: usize, S> {
 }
 
 impl<const L: usize, S: Screen<L>> Kernel for Block<'_, L, S> {
-    type Output = ();
+    type Output = usize;
 
     #[inline(always)]
-    fn run(mut self) {
+    fn run(mut self) -> usize {
         let vertex_faces = self.lists.candidates.vertex_face.len();
         let split = self.numbers.partition_point(|n| (*n as usize) < vertex_faces);
         let filled = self.compact(Shape::VertexFace, 0..split, 0);
-        let filled = self.compact(Shape::EdgeEdge, split..self.numbers.len(), filled);
-        self.numbers[filled..].fill(NONE);
+        self.compact(Shape::EdgeEdge, split..self.numbers.len(), filled)
     }
 }
 
@@ -204,8 +215,8 @@ impl Screen<WIDTH> for Fine<'_> {
 }
 
 /// In single precision, moved and scaled to the unit cube: the fourth number is the reach.
-struct Coarse {
-    x0: Vec<[f32; 4]>,
+pub(super) struct Coarse {
+    pub x0: Vec<[f32; 4]>,
     x1: Vec<[f32; 4]>,
     /// Lengths here for each metre there; zero, so that every pair stays open, where squares of these may leave the range
     /// of doubles.
@@ -213,12 +224,14 @@ struct Coarse {
 }
 
 impl Coarse {
-    fn new(x0: &[Vec3], x1: Option<&[Vec3]>, reach: &[f64], par: Par) -> Coarse {
+    /// A reach that is missing is zero.
+    pub fn new(x0: &[Vec3], x1: Option<&[Vec3]>, reach: &[f64], par: Par) -> Coarse {
         let x1 = x1.unwrap_or(&[]);
-        let mut bounds = Aabb::EMPTY;
-        for x in x0.iter().chain(x1) {
-            bounds = bounds.union(&Aabb { low: *x, high: *x });
-        }
+        let mut parts: Vec<_> = x0.chunks(PART).chain(x1.chunks(PART)).map(|x| (x, Aabb::EMPTY)).collect();
+        par.for_each_task(&mut parts, |(x, bounds)| {
+            *bounds = x.iter().fold(Aabb::EMPTY, |b, x| b.union(&Aabb { low: *x, high: *x }));
+        });
+        let bounds = parts.iter().fold(Aabb::EMPTY, |b, (_, part)| b.union(part));
         let (low, size) = (bounds.low, sub(bounds.high, bounds.low));
         let largest = size[0].max(size[1]).max(size[2]);
         let per_metre = if (1e-50..1e60).contains(&largest) { 1.0 / largest } else { 0.0 };
@@ -226,7 +239,7 @@ impl Coarse {
             par.map_indexed(x.len(), |v| {
                 let [a, b, c] = scale(per_metre, sub(x[v], low));
                 // Rounding is within the slack of the tests.
-                [a as f32, b as f32, c as f32, (per_metre * reach[v]) as f32]
+                [a as f32, b as f32, c as f32, (per_metre * reach.get(v).copied().unwrap_or(0.0)) as f32]
             })
         };
         Coarse { x0: packed(x0), x1: packed(x1), per_metre }

@@ -102,7 +102,10 @@ impl Par<'_> {
             Some(pool) if count > BLOCK => pool.install(|| {
                 let blocks = (0..count.div_ceil(BLOCK)).into_par_iter().with_max_len(1);
                 let found = blocks.map(|b| (b * BLOCK..count.min((b + 1) * BLOCK)).filter_map(&f).collect::<Vec<T>>());
-                found.collect::<Vec<_>>().into_iter().flatten().collect()
+                let mut lists: Vec<Vec<T>> = found.collect();
+                let mut all = Vec::with_capacity(lists.iter().map(Vec::len).sum());
+                lists.iter_mut().for_each(|list| all.append(list));
+                all
             }),
             _ => (0..count).filter_map(f).collect(),
         }

@@ -13,7 +13,7 @@ fn compare(scene: &Scene, tree: &mut BroadPhase, filter: &Filter, par: Par) -> u
     let mut found = Candidates::default();
     tree.refit(&scene.x0, &scene.x1, &scene.radius, par);
     tree.candidates(filter, &mut found, par);
-    tree.edge_face_candidates(filter, &mut found, par);
+    found.edge_face = tree.edge_face_candidates(filter, &|pairs| pairs.len(), par);
     assert!(
         found == expected,
         "{}: {} {} {} instead of {} {} {}",

@@ -4,6 +4,7 @@ use crate::random::Random;
 use crate::scenes::{Scene, scenes};
 use num_rational::BigRational as Q;
 use num_traits::{One, Signed, Zero};
+use signorini::detection::Primitives;
 use signorini::detection::intersection::{below_half_space, find, find_brute_force};
 use signorini::geometry::point_triangle;
 use signorini::math::predicates::{orient2d, orient3d, plane_side, segment_meets_triangle};
@@ -230,4 +231,43 @@ fn a_fold_that_crosses_its_neighbour_is_found() {
     assert!(signorini::math::norm(signorini::math::sub(found[0].point, [0.3, 0.3, 0.0])) < 1e-15);
     x[3] = [0.3, 0.3, 0.1];
     assert!(find(&p, &x, &|_, _| true, Par::Serial).is_empty());
+}
+
+/// Segments that end on triangles exactly, of sizes from that of the whole scene down to what single precision of it
+/// cannot tell from nothing: none of them is ruled out on the way.
+#[test]
+fn touches_that_single_precision_cannot_see_are_found() {
+    let mut r = Random::new(26);
+    let pool = Pool::new(2).unwrap();
+    // Multiples of 2^-40 below 2^8: sums and halves of halves are exact.
+    let unit = 2.0_f64.powi(-40);
+    let round = |v: Vec3| v.map(|c| (c / unit).round() * unit);
+    let (mut x, mut edges, mut faces) = (Vec::new(), Vec::new(), Vec::new());
+    for size in [1.0, 1e-2, 1e-4, 1e-6] {
+        for _ in 0..500 {
+            let a = round(scale(60.0, r.vector()));
+            let [u, v] = [0; 2].map(|_| round(scale(size, r.vector())));
+            // Inside the triangle, on an edge, at a corner.
+            let (s, t) = [(0.25, 0.5), (0.5, 0.0), (0.5, 0.5), (1.0, 0.0)][r.pick(4)];
+            let p = add_scaled(add_scaled(a, s, u), t, v);
+            // Away from the plane, or within it and away from the triangle.
+            let normal = signorini::math::cross(u, v);
+            let away = if r.pick(2) == 0 || (s, t) == (0.25, 0.5) {
+                scale([1.0, -1.0][r.pick(2)] / size, normal)
+            } else {
+                add_scaled(u, -0.5 - t, v)
+            };
+            let first = x.len() as u32;
+            x.extend([p, add_scaled(p, r.unit(), away), a, add_scaled(a, 1.0, u), add_scaled(a, 1.0, v)]);
+            edges.push([first, first + 1]);
+            faces.push([first + 2, first + 3, first + 4]);
+        }
+    }
+    let vertices: Vec<u32> = (0..x.len() as u32).collect();
+    let p = Primitives { vertices: &vertices, edges: &edges, faces: &faces };
+    for par in [Par::Serial, Par::Pool(&pool)] {
+        let found = find(&p, &x, &|_, _| true, par);
+        let own = found.iter().filter(|i| i.edge == i.face).count();
+        assert_eq!(own, edges.len());
+    }
 }
