@@ -106,11 +106,9 @@ impl Lists<'_> {
 
     /// Leaves those of the ascending numbers that the screen does not rule out.
     fn rule_out<const L: usize, S: Screen<L>>(&self, screen: &S, numbers: &mut Vec<u32>, par: Par) {
-        let mut blocks: Vec<(&mut [u32], usize)> = numbers.chunks_mut(BLOCK).map(|block| (block, 0)).collect();
-        par.for_each_task(&mut blocks, |(numbers, left)| {
-            *left = run_wide(Block::<L, S> { lists: *self, screen, numbers });
-        });
-        let left: Vec<usize> = blocks.into_iter().map(|(_, left)| left).collect();
+        let mut left = Vec::with_capacity(numbers.len().div_ceil(BLOCK));
+        let screened = |numbers| run_wide(Block::<L, S> { lists: *self, screen, numbers });
+        par.fold_tasks(numbers.chunks_mut(BLOCK), screened, |count: usize| left.push(count));
         let mut filled = 0;
         for (block, left) in left.into_iter().enumerate() {
             numbers.copy_within(block * BLOCK..block * BLOCK + left, filled);
@@ -227,11 +225,11 @@ impl Coarse {
     /// A reach that is missing is zero.
     pub fn new(x0: &[Vec3], x1: Option<&[Vec3]>, reach: &[f64], par: Par) -> Coarse {
         let x1 = x1.unwrap_or(&[]);
-        let mut parts: Vec<_> = x0.chunks(PART).chain(x1.chunks(PART)).map(|x| (x, Aabb::EMPTY)).collect();
-        par.for_each_task(&mut parts, |(x, bounds)| {
-            *bounds = x.iter().fold(Aabb::EMPTY, |b, x| b.union(&Aabb { low: *x, high: *x }));
-        });
-        let bounds = parts.iter().fold(Aabb::EMPTY, |b, (_, part)| b.union(part));
+        let mut bounds = Aabb::EMPTY;
+        let of_part = |x: &[Vec3]| x.iter().fold(Aabb::EMPTY, |b, x| b.union(&Aabb { low: *x, high: *x }));
+        for x in [x0, x1] {
+            par.fold_tasks(x.chunks(PART), of_part, |part| bounds = bounds.union(&part));
+        }
         let (low, size) = (bounds.low, sub(bounds.high, bounds.low));
         let largest = size[0].max(size[1]).max(size[2]);
         let per_metre = if (1e-50..1e60).contains(&largest) { 1.0 / largest } else { 0.0 };
