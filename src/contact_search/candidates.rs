@@ -129,11 +129,24 @@ impl Anchor {
     /// Whether a vertex leaves its box: at `x0` with `factor`, on its way with half of one to spare.
     fn is_left(&self, v: usize, model: &Model, x0: Vec3, x1: Vec3, factor: f64) -> bool {
         let half_thickness = model.bodies[model.vertex_body[v] as usize].half_thickness;
-        let near = Aabb::swept(x0, x0, factor * half_thickness);
-        let way = Aabb::swept(x0, x1, SWEPT_REACH * half_thickness);
-        // The box of a number that is none would be that of the other end.
-        !(is_finite(x0) && is_finite(x1) && self.boxes[v].contains(&near.union(&way)))
+        !(is_finite(x0)
+            && is_finite(x1)
+            && holds(&self.boxes[v], x0, x1, [factor, SWEPT_REACH].map(|f| f * half_thickness)))
     }
+}
+
+/// Whether a box holds that of `x0` and that of the way from there to `x1`, thickened by `near` and by `way`, both 0 or neither,
+/// and rounded outward: what lies beyond a number lies beyond its neighbour too.
+#[inline(always)]
+fn holds(own: &Aabb, x0: Vec3, x1: Vec3, [near, way]: [f64; 2]) -> bool {
+    let beyond = |bound: f64, x: f64| bound < x || (bound == x && near == 0.0);
+    let mut held = true;
+    for k in 0..3 {
+        let (low, high) = (x0[k].min(x1[k]), x0[k].max(x1[k]));
+        held &= beyond(own.low[k], x0[k] - near) & beyond(own.low[k], low - way);
+        held &= beyond(x0[k] + near, own.high[k]) & beyond(high + way, own.high[k]);
+    }
+    held
 }
 
 /// The collision primitives of a model.
@@ -144,4 +157,38 @@ pub fn primitives(model: &Model) -> Primitives<'_> {
 /// `factor` times the half thickness of every vertex's body `[m]`.
 pub(super) fn half_thicknesses(model: &Model, factor: f64) -> Vec<f64> {
     model.vertex_body.iter().map(|b| factor * model.bodies[*b as usize].half_thickness).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_holds_what_swept_boxes_cover() {
+        let mut seed = 7u64;
+        let mut next = |n: u64| {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 33) % n
+        };
+        let (mut held, mut left) = (0, 0);
+        for _ in 0..20_000 {
+            // Few values, and their neighbours, so that bounds are often met exactly.
+            let mut vector = || -> Vec3 { std::array::from_fn(|_| 0.1 * next(5) as f64 - 0.2) };
+            let (x0, x1) = (vector(), vector());
+            let [near, way] = [[0.0, 0.0], [0.1, 0.05], [0.05, 0.1]][next(3) as usize];
+            let covered = Aabb::swept(x0, x0, near).union(&Aabb::swept(x0, x1, way));
+            let mut own = covered;
+            for bound in own.low.iter_mut().chain(&mut own.high) {
+                *bound = match next(12) {
+                    0 => bound.next_up(),
+                    1 => bound.next_down(),
+                    _ => *bound,
+                };
+            }
+            let within = (0..3).all(|k| own.low[k] <= covered.low[k] && covered.high[k] <= own.high[k]);
+            assert_eq!(holds(&own, x0, x1, [near, way]), within, "{own:?} {x0:?} {x1:?} {near} {way}");
+            *if within { &mut held } else { &mut left } += 1;
+        }
+        assert!(held > 1000 && left > 1000);
+    }
 }

@@ -18,7 +18,7 @@ impl Aabb {
     /// The box of a point that moves on a line from `x0` to `x1`, thickened by `radius >= 0` on every side.
     ///
     /// Exact for radius 0, rounded outward otherwise: it contains the exact box.
-    #[inline]
+    #[inline(always)]
     pub fn swept(x0: Vec3, x1: Vec3, radius: f64) -> Aabb {
         let mut out = Aabb::EMPTY;
         for k in 0..3 {
@@ -41,12 +41,6 @@ impl Aabb {
             out.high[k] = out.high[k].max(other.high[k]);
         }
         out
-    }
-
-    /// Whether the other box lies within this one; not where a coordinate is not a number.
-    #[inline]
-    pub fn contains(&self, other: &Aabb) -> bool {
-        (0..3).all(|k| self.low[k] <= other.low[k] && other.high[k] <= self.high[k])
     }
 
     /// Whether the closed boxes share a point.
