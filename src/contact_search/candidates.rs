@@ -2,7 +2,7 @@
 
 use super::pair::BodyFilter;
 use crate::detection::intersection::{Intersection, find_with};
-use crate::detection::{BroadPhase, Candidates, Primitives};
+use crate::detection::{BroadPhase, Candidates, Primitives, Stars};
 use crate::geometry::Aabb;
 use crate::math::{Vec3, is_finite};
 use crate::model::Model;
@@ -12,9 +12,18 @@ use crate::parallel::Par;
 /// exactly.
 #[derive(Default)]
 pub struct CandidateSearch {
-    broad_phase: Option<(u64, BroadPhase)>,
+    meshes: Option<Meshes>,
     candidates: Candidates,
     anchor: Option<Anchor>,
+    /// Vertices outside their boxes, of the call that runs.
+    outside: Vec<bool>,
+}
+
+/// What the meshes of a model are searched by.
+struct Meshes {
+    topology: u64,
+    tree: BroadPhase,
+    stars: Stars,
 }
 
 /// What the present candidates were found for.
@@ -24,6 +33,8 @@ struct Anchor {
     factor: f64,
     /// The boxes searched, by vertex.
     boxes: Vec<Aabb>,
+    /// Whether the tree is fitted to them.
+    fitted: bool,
     /// Pairs found when all of them were searched, and how often boxes were widened since.
     pairs: usize,
     widened: u32,
@@ -55,12 +66,13 @@ impl CandidateSearch {
         par: Par,
     ) -> &Candidates {
         if let Some(anchor) = self.anchor.as_mut().filter(|anchor| anchor.is_for(model, filter, factor, x0.len())) {
-            let leaves = |v: usize| anchor.is_left(v, model, x0[v], x1[v], factor);
-            let count = par.sum(x0.len(), |v| f64::from(u8::from(leaves(v)))) as usize;
+            let outside = &mut self.outside;
+            outside.resize(x0.len(), false);
+            par.map_into(outside, |v| anchor.is_left(v, model, x0[v], x1[v], factor));
+            let count = outside.iter().filter(|left| **left).count();
             if count == 0 {
                 return &self.candidates;
             }
-            let outside = par.map_indexed(x0.len(), leaves);
             let pairs = self.candidates.vertex_face.len() + self.candidates.edge_edge.len();
             let grown = pairs > anchor.pairs + anchor.pairs / 4;
             let finite = (0..x0.len()).all(|v| !outside[v] || (is_finite(x0[v]) && is_finite(x1[v])));
@@ -71,15 +83,20 @@ impl CandidateSearch {
                     let radius = (factor + 1.0) * model.bodies[model.vertex_body[v] as usize].half_thickness;
                     anchor.boxes[v] = anchor.boxes[v].union(&Aabb::swept(x0[v], x1[v], radius));
                 }
-                let broad_phase = tree(&mut self.broad_phase, model);
-                broad_phase.refit_to(&anchor.boxes, par);
+                let broad_phase = &mut meshes(&mut self.meshes, model).tree;
+                if anchor.fitted {
+                    broad_phase.refit_woken(outside, &anchor.boxes);
+                } else {
+                    broad_phase.refit_to(&anchor.boxes, par);
+                }
+                anchor.fitted = true;
                 let allowed = |a, b| allowed(model, filter, a, b);
-                broad_phase.add_candidates(&outside, &allowed, &mut self.candidates, par);
+                broad_phase.add_candidates(outside, &allowed, &mut self.candidates, par);
                 return &self.candidates;
             }
         }
         let radius = half_thicknesses(model, factor + 1.0);
-        let broad_phase = tree(&mut self.broad_phase, model);
+        let broad_phase = &mut meshes(&mut self.meshes, model).tree;
         broad_phase.refit(x0, x1, &radius, par);
         broad_phase.candidates(&|a, b| allowed(model, filter, a, b), &mut self.candidates, par);
         let mut boxes = self.anchor.take().map(|anchor| anchor.boxes).unwrap_or_default();
@@ -87,14 +104,18 @@ impl CandidateSearch {
         boxes.extend_from_slice(broad_phase.boxes());
         let (topology, filter) = (model.topology_hash, filter.fingerprint());
         let pairs = self.candidates.vertex_face.len() + self.candidates.edge_edge.len();
-        self.anchor = Some(Anchor { topology, filter, factor, boxes, pairs, widened: 0 });
+        self.anchor = Some(Anchor { topology, filter, factor, boxes, fitted: true, pairs, widened: 0 });
         &self.candidates
     }
 
     /// Edges and faces that share a point at `x`, by the same tree and exactly.
     pub fn crossings(&mut self, model: &Model, filter: &BodyFilter, x: &[Vec3], par: Par) -> Vec<Intersection> {
         let allowed = |a, b| allowed(model, filter, a, b);
-        find_with(tree(&mut self.broad_phase, model), &primitives(model), x, &allowed, par)
+        if let Some(anchor) = &mut self.anchor {
+            anchor.fitted = false;
+        }
+        let meshes = meshes(&mut self.meshes, model);
+        find_with((&mut meshes.tree, &meshes.stars), &primitives(model), x, &allowed, par)
     }
 
     /// Bytes held.
@@ -105,12 +126,15 @@ impl CandidateSearch {
     }
 }
 
-/// The tree of a model, built where there is none of this topology.
-fn tree<'a>(kept: &'a mut Option<(u64, BroadPhase)>, model: &Model) -> &'a mut BroadPhase {
-    if kept.as_ref().is_some_and(|(topology, _)| *topology != model.topology_hash) {
+/// The tree and the stars of a model, built where there are none of this topology.
+fn meshes<'a>(kept: &'a mut Option<Meshes>, model: &Model) -> &'a mut Meshes {
+    let topology = model.topology_hash;
+    if kept.as_ref().is_some_and(|meshes| meshes.topology != topology) {
         *kept = None;
     }
-    &mut kept.get_or_insert_with(|| (model.topology_hash, BroadPhase::build(&primitives(model)))).1
+    let primitives = primitives(model);
+    let build = || Meshes { topology, tree: BroadPhase::build(&primitives), stars: Stars::build(&primitives) };
+    kept.get_or_insert_with(build)
 }
 
 fn allowed(model: &Model, filter: &BodyFilter, a: u32, b: u32) -> bool {

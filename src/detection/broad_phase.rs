@@ -5,7 +5,7 @@
 //! traversal.
 
 use super::bvh::{Bvh, Frame, LEAF, MIXED, PackedBox};
-use super::leaf_blocks::{Block, LeafBlocks};
+use super::leaf_blocks::LeafBlocks;
 use super::leaf_pairs::Side;
 use super::ownership::{Ownership, own};
 use super::pair_lists::{PairBuffer, PairLists, merge, unite};
@@ -28,8 +28,17 @@ pub type Screen<'a> = dyn Fn(&mut [[u32; 2]]) -> usize + Sync + 'a;
 #[derive(Clone, Copy)]
 enum Wanted<'a> {
     Contacts,
-    /// Those that the screen keeps.
-    EdgeFace(&'a Screen<'a>),
+    /// Those that the second screen keeps, of the edges of faces that meet in no clear star, see [`super::Stars`], and that
+    /// the first keeps.
+    EdgeFace(&'a [bool], [&'a Screen<'a>; 2]),
+}
+
+/// What a tree is fitted for.
+#[derive(Clone, Copy)]
+enum Fit {
+    Contacts,
+    /// Faces, and edges of no face.
+    EdgesOfFaces,
 }
 
 /// A tree over the primitives of a model: built once, refitted to every motion.
@@ -45,9 +54,12 @@ pub struct BroadPhase {
     leaf_vertices: LeafBlocks<1>,
     leaf_edges: LeafBlocks<2>,
     leaf_faces: LeafBlocks<3>,
+    /// Edges of no face alone.
+    leaf_wires: LeafBlocks<2>,
     leaves: Vec<PackedBox>,
     /// By vertex index.
     boxes: Vec<Aabb>,
+    frame: Frame,
     packed: Vec<PackedBox>,
 }
 
@@ -67,8 +79,10 @@ impl BroadPhase {
             leaf_vertices: LeafBlocks::default(),
             leaf_edges: LeafBlocks::default(),
             leaf_faces: LeafBlocks::default(),
+            leaf_wires: LeafBlocks::default(),
             leaves: Vec::new(),
             boxes: Vec::new(),
+            frame: Frame::of(&Aabb::EMPTY),
             packed: Vec::new(),
         }
     }
@@ -82,32 +96,58 @@ impl BroadPhase {
         let motion = Motion { x0, x1, radius };
         self.boxes.resize(x0.len(), Aabb::EMPTY);
         par.map_into(&mut self.boxes, |v| motion.vertex_box(v as u32));
-        self.fit_boxes(par);
+        self.fit_boxes(Fit::Contacts, par);
     }
 
     /// Fits the tree to boxes, one for every vertex index. Cost and candidates as of [`BroadPhase::refit`].
     pub fn refit_to(&mut self, boxes: &[Aabb], par: Par) {
         self.boxes.clear();
         self.boxes.extend_from_slice(boxes);
-        self.fit_boxes(par);
+        self.fit_boxes(Fit::Contacts, par);
     }
 
-    fn fit_boxes(&mut self, par: Par) {
+    /// Fits the tree to boxes that differ from those of the last fit for `woken` vertices alone.
+    ///
+    /// Candidates as of [`BroadPhase::refit_to`]. Cost: linear, and little where few are woken.
+    pub fn refit_woken(&mut self, woken: &[bool], boxes: &[Aabb]) {
+        for v in (0..boxes.len()).filter(|v| woken[*v]) {
+            self.boxes[v] = boxes[v];
+            self.packed[v] = self.frame.packed(&boxes[v]);
+        }
+        for leaf in self.holding(woken) {
+            self.leaf_vertices.refit_leaf(leaf, &self.packed);
+            self.leaf_edges.refit_leaf(leaf, &self.packed);
+            self.leaf_faces.refit_leaf(leaf, &self.packed);
+            self.leaves[leaf as usize] = bounds(&self.leaf_vertices, &self.leaf_edges, &self.leaf_faces, leaf);
+        }
+        self.tree.refit(&self.leaves);
+    }
+
+    /// The leaves with a vertex for which `woken` says yes.
+    fn holding(&self, woken: &[bool]) -> Vec<u32> {
+        let holds = |leaf: &u32| {
+            self.leaf_vertices.holds(*leaf, woken)
+                || self.leaf_edges.holds(*leaf, woken)
+                || self.leaf_faces.holds(*leaf, woken)
+        };
+        (0..self.leaves.len() as u32).filter(holds).collect()
+    }
+
+    fn fit_boxes(&mut self, fit: Fit, par: Par) {
         // A union does not depend on the order.
-        let bounds = self.boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b));
-        let frame = Frame::of(&bounds);
+        self.frame = Frame::of(&self.boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b)));
         self.packed.resize(self.boxes.len(), PackedBox::EMPTY);
-        let boxes = &self.boxes;
+        let (boxes, frame) = (&self.boxes, &self.frame);
         par.map_into(&mut self.packed, |v| frame.packed(&boxes[v]));
         if !self.built {
             self.arrange();
         }
-        let quality = self.fit(par);
+        let quality = self.fit(fit, par);
         if self.quality == 0.0 {
             self.quality = quality;
         } else if quality > DECAY * self.quality {
             self.arrange();
-            self.quality = self.fit(par);
+            self.quality = self.fit(fit, par);
         }
     }
 
@@ -124,34 +164,44 @@ impl BroadPhase {
 
     /// Orders the elements anew by their boxes.
     fn arrange(&mut self) {
-        let (edges, faces, packed, owned) = (&self.edges, &self.faces, &self.packed, &self.ownership);
-        let bounds = |corners: &[u32]| {
-            corners[1..].iter().fold(packed[corners[0] as usize], |b, v| b.union(&packed[*v as usize]))
-        };
-        let of_faces = faces.iter().map(|f| bounds(f));
-        let of_edges = owned.loose_edges.iter().map(|e| bounds(&edges[*e as usize]));
-        let of_vertices = owned.loose_vertices.iter().map(|v| packed[*v as usize]);
+        let (edges, faces, owned) = (&self.edges, &self.faces, &self.ownership);
+        let of_faces = faces.iter().map(|f| self.bounds(f));
+        let of_edges = owned.loose_edges.iter().map(|e| self.bounds(&edges[*e as usize]));
+        let of_vertices = owned.loose_vertices.iter().map(|v| self.packed[*v as usize]);
         let (tree, order) = Bvh::build(of_faces.chain(of_edges).chain(of_vertices), &owned.components);
         self.leaf_vertices.arrange(order.chunks(LEAF), &owned.vertices, |v| [v]);
         self.leaf_edges.arrange(order.chunks(LEAF), &owned.edges, |e| edges[e as usize]);
         self.leaf_faces.arrange(order.chunks(LEAF), &owned.faces, |f| faces[f as usize]);
+        self.leaf_wires.arrange(order.chunks(LEAF), &owned.wires, |e| edges[e as usize]);
         self.tree = tree;
         self.built = true;
     }
 
+    /// The box of a primitive.
+    #[inline(always)]
+    fn bounds<const N: usize>(&self, corners: &[u32; N]) -> PackedBox {
+        corners[1..].iter().fold(self.packed[corners[0] as usize], |b, v| b.union(&self.packed[*v as usize]))
+    }
+
     /// New boxes of items, leaves and branches. Returns the extent of the branches against that of the leaves.
-    fn fit(&mut self, par: Par) -> f64 {
-        self.leaf_vertices.refit(&self.packed, par);
-        self.leaf_edges.refit(&self.packed, par);
+    fn fit(&mut self, fit: Fit, par: Par) -> f64 {
+        match fit {
+            Fit::Contacts => {
+                self.leaf_vertices.refit(&self.packed, par);
+                self.leaf_edges.refit(&self.packed, par);
+            }
+            Fit::EdgesOfFaces => self.leaf_wires.refit(&self.packed, par),
+        }
         self.leaf_faces.refit(&self.packed, par);
         self.leaves.resize(self.tree.components.len(), PackedBox::EMPTY);
         let (vertices, edges, faces) = (&self.leaf_vertices, &self.leaf_edges, &self.leaf_faces);
-        par.map_into(&mut self.leaves, |leaf| {
-            let leaf = leaf as u32;
-            let all = vertices.leaf(leaf).iter().map(Block::bounds);
-            let all = all.chain(edges.leaf(leaf).iter().map(Block::bounds));
-            all.chain(faces.leaf(leaf).iter().map(Block::bounds)).fold(PackedBox::EMPTY, |a, b| a.union(&b))
-        });
+        let wires = &self.leaf_wires;
+        match fit {
+            Fit::Contacts => par.map_into(&mut self.leaves, |i| bounds(vertices, edges, faces, i as u32)),
+            Fit::EdgesOfFaces => {
+                par.map_into(&mut self.leaves, |i| wires.bounds(i as u32).union(&faces.bounds(i as u32)))
+            }
+        }
         self.tree.refit(&self.leaves)
     }
 
@@ -169,13 +219,8 @@ impl BroadPhase {
     ///
     /// Cost: linear, plus what the leaves with such vertices meet.
     pub fn add_candidates(&self, woken: &[bool], filter: &Filter, out: &mut Candidates, par: Par) {
-        let awake: Vec<bool> = (0..self.leaves.len() as u32)
-            .map(|leaf| {
-                self.leaf_vertices.holds(leaf, woken)
-                    || self.leaf_edges.holds(leaf, woken)
-                    || self.leaf_faces.holds(leaf, woken)
-            })
-            .collect();
+        let mut awake = vec![false; self.leaves.len()];
+        self.holding(woken).into_iter().for_each(|leaf| awake[leaf as usize] = true);
         let [vertex_face, edge_edge] = self.traverse(Wanted::Contacts, Some(&awake), filter, par);
         let any = |corners: &[u32]| corners.iter().any(|v| woken[*v as usize]);
         let edge = |e: u32| any(&self.edges[e as usize]);
@@ -188,10 +233,25 @@ impl BroadPhase {
         unite(&mut out.edge_edge, &mut found);
     }
 
-    /// Edge-face pairs whose boxes overlap, that share no vertex, and that the filter lets pass: what the screen keeps of
-    /// them, sorted. It sees each pair once, in lists that depend on the tree alone.
-    pub fn edge_face_candidates(&self, filter: &Filter, screen: &Screen, par: Par) -> Vec<[u32; 2]> {
-        let [edge_face, _] = self.traverse(Wanted::EdgeFace(screen), None, filter, par);
+    /// Edge-face pairs that share no vertex, that the filter lets pass, and whose boxes overlap at `x`: what the screens keep
+    /// of them, sorted. The first one sees pairs of faces, of which edges and faces follow, the second edge-face pairs; each
+    /// pair once, in lists that depend on the tree alone, and some whose boxes do not quite overlap.
+    ///
+    /// Left out are edges of faces that have a vertex in common with the other face at which `clear` says that the star does
+    /// not cross itself, see [`super::Stars`]; none beyond its end. The tree is fitted to `x` for this search alone: for
+    /// contacts it has to be refitted. Cost: as of [`BroadPhase::refit`] and [`BroadPhase::candidates`].
+    pub fn edge_face_candidates(
+        &mut self,
+        x: &[Vec3],
+        clear: &[bool],
+        filter: &Filter,
+        screens: [&Screen; 2],
+        par: Par,
+    ) -> Vec<[u32; 2]> {
+        self.boxes.resize(x.len(), Aabb::EMPTY);
+        par.map_into(&mut self.boxes, |v| Aabb { low: x[v], high: x[v] });
+        self.fit_boxes(Fit::EdgesOfFaces, par);
+        let [edge_face, _] = self.traverse(Wanted::EdgeFace(clear, screens), None, filter, par);
         let mut pairs: Vec<[u32; 2]> = edge_face.iter().flat_map(PairBuffer::pairs).copied().collect();
         pairs.sort_unstable();
         pairs
@@ -207,15 +267,14 @@ impl BroadPhase {
         let count = self.leaves.len();
         let task = |start: usize| Task { tree: self, wanted, awake, filter, leaves: start..count.min(start + TASK) };
         let mut tasks: Vec<_> = (0..count).step_by(TASK).map(|i| (task(i), Found::default())).collect();
-        par.for_each_task(&mut tasks, |(task, found)| {
-            *found = run_eight(task.clone());
-            // While the pairs are in the processor's cache.
-            if let Wanted::EdgeFace(screen) = wanted {
-                found.0.keep(screen);
-            }
-        });
+        par.for_each_task(&mut tasks, |(task, found)| *found = run_eight(task.clone()));
         tasks.into_iter().map(|(_, found)| found).unzip().into()
     }
+}
+
+/// The box of a leaf, from those of its primitives.
+fn bounds(vertices: &LeafBlocks<1>, edges: &LeafBlocks<2>, faces: &LeafBlocks<3>, leaf: u32) -> PackedBox {
+    vertices.bounds(leaf).union(&edges.bounds(leaf)).union(&faces.bounds(leaf))
 }
 
 /// The leaves of one task.
@@ -248,9 +307,20 @@ impl EightKernel for Task<'_> {
             for b in near.iter().filter(|b| **b >= a || sleeps(**b)) {
                 match self.wanted {
                     Wanted::Contacts => self.contacts(eight, a, *b, &mut found),
-                    Wanted::EdgeFace(_) => self.edge_faces(eight, a, *b, &mut found),
+                    Wanted::EdgeFace(clear, _) => self.edge_faces(eight, a, *b, clear, &mut found),
                 }
             }
+            if let Wanted::EdgeFace(_, [of_faces, of_edges]) = self.wanted {
+                let last = a + 1 == self.leaves.end as u32;
+                if last || found.1.is_many() {
+                    found.1.screen(of_faces);
+                    self.expand(&mut found);
+                    found.0.screen_new(of_edges);
+                }
+            }
+        }
+        if let Wanted::EdgeFace(..) = self.wanted {
+            found.0.shrink();
         }
         found
     }
@@ -279,7 +349,8 @@ impl Task<'_> {
         let t = self.tree;
         let (box_a, box_b) = (t.leaves[a as usize].query(), t.leaves[b as usize].query());
         let (vertices, edges, faces) = (&t.leaf_vertices, &t.leaf_edges, &t.leaf_faces);
-        let mut side = Side { eight, boxes: &t.boxes, filter: self.open_filter(a, b), out: &mut found.0 };
+        let filter = self.open_filter(a, b);
+        let mut side = Side { eight, boxes: &t.boxes, filter, apart_at: None, out: &mut found.0 };
         side.pairs::<1, 3, false>(vertices.leaf(a), &box_b, faces.leaf(b), &box_a);
         if a == b {
             side.out = &mut found.1;
@@ -291,15 +362,42 @@ impl Task<'_> {
         side.pairs::<2, 2, true>(edges.leaf(a), &box_b, edges.leaf(b), &box_a);
     }
 
+    /// Edges of no face with faces, and pairs of faces whose edges [`Task::expand`] tells.
     #[inline(always)]
-    fn edge_faces<E: Eight>(&self, eight: E, a: u32, b: u32, found: &mut Found) {
+    fn edge_faces<E: Eight>(&self, eight: E, a: u32, b: u32, clear: &[bool], found: &mut Found) {
         let t = self.tree;
         let (box_a, box_b) = (t.leaves[a as usize].query(), t.leaves[b as usize].query());
-        let (edges, faces) = (&t.leaf_edges, &t.leaf_faces);
-        let mut side = Side { eight, boxes: &t.boxes, filter: self.open_filter(a, b), out: &mut found.0 };
-        side.pairs::<2, 3, false>(edges.leaf(a), &box_b, faces.leaf(b), &box_a);
+        let (wires, faces) = (&t.leaf_wires, &t.leaf_faces);
+        let mut side =
+            Side { eight, boxes: &t.boxes, filter: self.open_filter(a, b), apart_at: None, out: &mut found.0 };
+        side.pairs::<2, 3, false>(wires.leaf(a), &box_b, faces.leaf(b), &box_a);
         if a != b {
-            side.pairs::<2, 3, false>(edges.leaf(b), &box_a, faces.leaf(a), &box_b);
+            side.pairs::<2, 3, false>(wires.leaf(b), &box_a, faces.leaf(a), &box_b);
         }
+        let mut side = Side { out: &mut found.1, apart_at: Some(clear), ..side };
+        if a == b {
+            side.pairs_within(faces.leaf(a));
+        } else {
+            side.pairs::<3, 3, true>(faces.leaf(a), &box_b, faces.leaf(b), &box_a);
+        }
+    }
+
+    /// The edges that faces own with the faces they were found with, where their boxes overlap.
+    #[inline(always)]
+    fn expand(&self, (edge_face, faces): &mut Found) {
+        let t = self.tree;
+        for [a, b] in faces.pairs() {
+            for (own, other) in [(*a, *b), (*b, *a)] {
+                let corners = &t.faces[other as usize];
+                let bounds = t.bounds(corners);
+                for edge in t.ownership.edges.of(own) {
+                    let ends = &t.edges[*edge as usize];
+                    if t.bounds(ends).overlaps(&bounds) && !ends.iter().any(|v| corners.contains(v)) {
+                        edge_face.push_one([*edge, other]);
+                    }
+                }
+            }
+        }
+        faces.clear();
     }
 }

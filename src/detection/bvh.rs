@@ -22,6 +22,9 @@ pub(super) struct PackedBox {
 impl PackedBox {
     pub const EMPTY: PackedBox = PackedBox { low: [f32::INFINITY; 4], high: [f32::NEG_INFINITY; 4] };
 
+    /// A lane that holds no box.
+    pub const NONE: PackedBox = PackedBox { low: [f32::NAN; 4], high: [f32::NAN; 4] };
+
     #[inline(always)]
     pub fn union(&self, other: &PackedBox) -> PackedBox {
         let mut out = *self;
@@ -30,6 +33,16 @@ impl PackedBox {
             out.high[k] = if other.high[k] > self.high[k] { other.high[k] } else { self.high[k] };
         }
         out
+    }
+
+    /// Whether they overlap or touch.
+    #[inline(always)]
+    pub fn overlaps(&self, other: &PackedBox) -> bool {
+        let mut hit = true;
+        for k in 0..4 {
+            hit &= (self.low[k] <= other.high[k]) & (other.low[k] <= self.high[k]);
+        }
+        hit
     }
 
     /// The union of eight boxes given by lanes; lanes of NaN hold none.
@@ -53,6 +66,16 @@ impl PackedBox {
             (out.low[k], out.high[k]) = (smallest[0], largest[0]);
         }
         out
+    }
+
+    /// Eight boxes by lanes.
+    #[inline(always)]
+    pub fn rows(boxes: &[PackedBox; 8]) -> (Rows, Rows) {
+        let (mut low, mut high) = (Rows::default(), Rows::default());
+        for (i, b) in boxes.iter().enumerate() {
+            b.write(&mut low, &mut high, i);
+        }
+        (low, high)
     }
 
     /// Writes the box into one of eight lanes.

@@ -9,7 +9,7 @@
 
 use super::primitives::{Filter, Primitives};
 use super::screening::{COARSE_ERROR, Coarse};
-use super::{BroadPhase, Motion, brute_force};
+use super::{BroadPhase, Motion, Stars, brute_force};
 use crate::geometry::{edge_edge, point_triangle};
 use crate::math::predicates::{plane_side, segment_meets_triangle};
 use crate::math::simd::points::{self, Point, gather, gather_quads, largest};
@@ -39,21 +39,23 @@ pub struct Intersection {
 /// Exact for all finite positions ([`crate::math::predicates`]); pairs that share a vertex and pairs that the filter
 /// does not let pass are left out. Cost: `n log n` plus the pairs whose boxes overlap.
 pub fn find(primitives: &Primitives, x: &[Vec3], filter: &Filter, par: Par) -> Vec<Intersection> {
-    find_with(&mut BroadPhase::build(primitives), primitives, x, filter, par)
+    find_with((&mut BroadPhase::build(primitives), &Stars::build(primitives)), primitives, x, filter, par)
 }
 
-/// [`find`] with a tree that was built from the same primitives; it is refitted to `x`.
+/// [`find`] with a tree and stars that were built from the same primitives; the tree is refitted to `x`.
 pub fn find_with(
-    broad_phase: &mut BroadPhase,
+    (broad_phase, stars): (&mut BroadPhase, &Stars),
     primitives: &Primitives,
     x: &[Vec3],
     filter: &Filter,
     par: Par,
 ) -> Vec<Intersection> {
-    broad_phase.refit(x, x, &[], par);
     let coarse = Coarse::new(x, None, &[], par);
-    let rule_out = |pairs: &mut [[u32; 2]]| run_wide(RuleOut { primitives, x, coarse: &coarse.x0, pairs });
-    let open = broad_phase.edge_face_candidates(filter, &rule_out, par);
+    let x0 = &coarse.x0;
+    let apart = |pairs: &mut [[u32; 2]]| run_wide(RuleOutFaces { primitives, coarse: x0, pairs });
+    let rule_out = |pairs: &mut [[u32; 2]]| run_wide(RuleOut { primitives, x, coarse: x0, pairs });
+    let clear = stars.clear(x0, par);
+    let open = broad_phase.edge_face_candidates(x, &clear, filter, [&apart, &rule_out], par);
     par.filter_indexed(open.len(), |i| decide(primitives, open[i], x))
 }
 
@@ -80,31 +82,58 @@ impl Kernel for RuleOut<'_> {
     #[inline(always)]
     fn run(self) -> usize {
         let (x, coarse) = (self.x, self.coarse);
-        let open = compact(self.primitives, self.pairs, |v: &[[usize; 5]; COARSE_WIDTH]| {
-            margin(&gather_quads(coarse, v).0, &SINGLE).0
-        });
-        compact(self.primitives, &mut self.pairs[..open], |v: &[[usize; 5]; WIDTH]| margin(&gather(x, v), &DOUBLE).0)
+        let corners = |pair| vertices(self.primitives, pair);
+        let coarsely = |v: &[[usize; 5]; COARSE_WIDTH]| margin(&gather_quads(coarse, v).0, &SINGLE).0;
+        let open = compact(self.pairs, corners, coarsely);
+        compact(&mut self.pairs[..open], corners, |v: &[[usize; 5]; WIDTH]| margin(&gather(x, v), &DOUBLE).0)
+    }
+}
+
+/// The same for pairs of faces, in single precision alone.
+struct RuleOutFaces<'a> {
+    primitives: &'a Primitives<'a>,
+    coarse: &'a [[f32; 4]],
+    pairs: &'a mut [[u32; 2]],
+}
+
+impl Kernel for RuleOutFaces<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run(self) -> usize {
+        let faces = self.primitives.faces;
+        let corners = |[first, second]: [u32; 2]| {
+            let ([a, b, c], [p, q, r]) = (faces[first as usize], faces[second as usize]);
+            [a, b, c, p, q, r].map(|v| v as usize)
+        };
+        let margin = |v: &[[usize; 6]; COARSE_WIDTH]| {
+            let [a, b, c, p, q, r] = gather_quads(self.coarse, v).0;
+            face_margin(&[p, q, r], &[a, b, c], &SINGLE).0
+        };
+        let open = compact(self.pairs, corners, margin);
+        // The directions of the other face, where those of the one did not do.
+        compact(&mut self.pairs[..open], |[a, b]| corners([b, a]), margin)
     }
 }
 
 /// Moves the pairs whose margin is not greater than zero, `L` side by side, to the front; how many they are.
 #[inline(always)]
-fn compact<const L: usize, T: Number>(
-    primitives: &Primitives,
+fn compact<const L: usize, const K: usize, T: Number>(
     pairs: &mut [[u32; 2]],
-    margin: impl Fn(&[[usize; 5]; L]) -> [T; L],
+    corners: impl Fn([u32; 2]) -> [usize; K],
+    margin: impl Fn(&[[usize; K]; L]) -> [T; L],
 ) -> usize {
     let (mut start, mut filled) = (0, 0);
     while start < pairs.len() {
         let width = L.min(pairs.len() - start);
         // Lanes beyond the last pair repeat it.
         let mut group = [pairs[start]; L];
-        let mut corners = [[0; 5]; L];
+        let mut v = [[0; K]; L];
         for l in 0..L {
             group[l] = pairs[start + l.min(width - 1)];
-            corners[l] = vertices(primitives, group[l]);
+            v[l] = corners(group[l]);
         }
-        let margin = margin(&corners);
+        let margin = margin(&v);
         for l in 0..width {
             // What is not a number stays open.
             let apart = margin[l] > T::ZERO;
@@ -132,11 +161,11 @@ fn decide(primitives: &Primitives, pair: [u32; 2], x: &[Vec3]) -> Option<Interse
 }
 
 /// How far a computed `n·x` may be off, for two that are compared: by `(absolute + relative M) |n|_1`, M the extent.
-struct Rounding<T> {
-    absolute: T,
-    relative: T,
+pub(super) struct Rounding<T> {
+    pub absolute: T,
+    pub relative: T,
     /// Sizes of `|n|_1 M` whose products stay clear of the ends of the number format; others decide nothing.
-    sizes: [T; 2],
+    pub sizes: [T; 2],
 }
 
 /// Positions are the doubles given: each `n·x` is off by less than `5 u |n|_1 M` with u the unit roundoff.
@@ -144,42 +173,88 @@ const DOUBLE: Rounding<f64> = Rounding { absolute: 0.0, relative: 8.0 * f64::EPS
 
 /// Positions are within the unit cube, each coordinate off by u at most, differences of them by 2 u and one rounding
 /// more: each `n·x` by less than `(2 u + 6 u M) |n|_1`.
-const SINGLE: Rounding<f32> = Rounding { absolute: COARSE_ERROR, relative: 8.0 * f32::EPSILON, sizes: [1e-30, 1e30] };
+pub(super) const SINGLE: Rounding<f32> =
+    Rounding { absolute: COARSE_ERROR, relative: 8.0 * f32::EPSILON, sizes: [1e-30, 1e30] };
 
-/// Greater than zero where a direction certainly separates the segment `p q` from the triangle `a b c`: the normal of
-/// the triangle's plane, and in that plane those of the triangle's edges and of the segment.
+/// Greater than zero where a direction certainly separates the segment `p q` from the triangle `a b c`: those of
+/// [`face_margin`], and the normal of the segment in the triangle's plane.
 #[inline(always)]
 fn margin<const L: usize, T: Number>([p, q, a, b, c]: &[Point<L, T>; 5], rounding: &Rounding<T>) -> Lanes<L, T> {
-    let all = [points::sub(p, a), points::sub(q, a), points::sub(b, a), points::sub(c, a)];
-    let [p, q, b, c] = &all;
-    let extent = largest(p).max(largest(q)).max(largest(b).max(largest(c)));
-    let error = Lanes::splat(rounding.absolute) + Lanes::splat(rounding.relative) * extent;
-    let normal = points::cross(b, c);
-    let mut best = separation(&normal, &all, extent, error, rounding.sizes);
-    for along in [*b, *c, points::sub(c, b), points::sub(q, p)] {
-        best = best.max(separation(&points::cross(&normal, &along), &all, extent, error, rounding.sizes));
-    }
-    best
+    let pair = Differences::new(&[*p, *q], &[*a, *b, *c], rounding);
+    let across = points::cross(&pair.normal(), &points::sub(q, p));
+    pair.face_margin().max(pair.separation(&across))
 }
 
-/// Greater than zero where the direction n, whatever it is, certainly has the segment's ends `p q` on one side of the
-/// triangle's corners: 0, b and c. `error` is that of a [`Rounding`] for each unit of `|n|_1`.
+/// Greater than zero where a direction certainly separates some points from the triangle `a b c`: the normal of its plane,
+/// and in that plane those of its edges.
 #[inline(always)]
-fn separation<const L: usize, T: Number>(
-    n: &Point<L, T>,
-    [p, q, b, c]: &[Point<L, T>; 4],
-    extent: Lanes<L, T>,
-    error: Lanes<L, T>,
-    [smallest, greatest]: [T; 2],
+fn face_margin<const L: usize, const M: usize, T: Number>(
+    others: &[Point<L, T>; M],
+    face: &[Point<L, T>; 3],
+    rounding: &Rounding<T>,
 ) -> Lanes<L, T> {
-    let (zero, length) = (Lanes::splat(T::ZERO), n[0].abs() + n[1].abs() + n[2].abs());
-    let (np, nq, nb, nc) = (points::dot(n, p), points::dot(n, q), points::dot(n, b), points::dot(n, c));
-    let above = np.min(nq) - zero.max(nb).max(nc);
-    let below = zero.min(nb).min(nc) - np.max(nq);
-    let size = length * extent;
-    let in_range = (size - Lanes::splat(smallest)).min(Lanes::splat(greatest) - size);
-    // NaN last: the smaller of two is the second where one is not a number.
-    in_range.min(above.max(below) - length * error)
+    Differences::new(others, face, rounding).face_margin()
+}
+
+/// Some points and a triangle, relative to its first corner.
+struct Differences<const L: usize, const M: usize, T> {
+    others: [Point<L, T>; M],
+    b: Point<L, T>,
+    c: Point<L, T>,
+    extent: Lanes<L, T>,
+    /// That of a [`Rounding`] for each unit of `|n|_1`.
+    error: Lanes<L, T>,
+    sizes: [T; 2],
+}
+
+impl<const L: usize, const M: usize, T: Number> Differences<L, M, T> {
+    #[inline(always)]
+    fn new(others: &[Point<L, T>; M], [a, b, c]: &[Point<L, T>; 3], rounding: &Rounding<T>) -> Self {
+        let (b, c) = (points::sub(b, a), points::sub(c, a));
+        let mut extent = largest(&b).max(largest(&c));
+        let mut from_a = *others;
+        for point in &mut from_a {
+            *point = points::sub(point, a);
+            extent = extent.max(largest(point));
+        }
+        let error = Lanes::splat(rounding.absolute) + Lanes::splat(rounding.relative) * extent;
+        Differences { others: from_a, b, c, extent, error, sizes: rounding.sizes }
+    }
+
+    #[inline(always)]
+    fn normal(&self) -> Point<L, T> {
+        points::cross(&self.b, &self.c)
+    }
+
+    #[inline(always)]
+    fn face_margin(&self) -> Lanes<L, T> {
+        let normal = self.normal();
+        let mut best = self.separation(&normal);
+        for along in [self.b, self.c, points::sub(&self.c, &self.b)] {
+            best = best.max(self.separation(&points::cross(&normal, &along)));
+        }
+        best
+    }
+
+    /// Greater than zero where the direction n, whatever it is, certainly has the points on one side of the triangle's
+    /// corners.
+    #[inline(always)]
+    fn separation(&self, n: &Point<L, T>) -> Lanes<L, T> {
+        let (zero, length) = (Lanes::splat(T::ZERO), n[0].abs() + n[1].abs() + n[2].abs());
+        let (nb, nc) = (points::dot(n, &self.b), points::dot(n, &self.c));
+        let mut lowest = points::dot(n, &self.others[0]);
+        let mut highest = lowest;
+        for point in &self.others[1..] {
+            let along = points::dot(n, point);
+            (lowest, highest) = (lowest.min(along), highest.max(along));
+        }
+        let above = lowest - zero.max(nb).max(nc);
+        let below = zero.min(nb).min(nc) - highest;
+        let (size, [smallest, greatest]) = (length * self.extent, self.sizes);
+        let in_range = (size - Lanes::splat(smallest)).min(Lanes::splat(greatest) - size);
+        // NaN last: the smaller of two is the second where one is not a number.
+        in_range.min(above.max(below) - length * self.error)
+    }
 }
 
 /// A point of the segment that is nearest to the triangle they meet in, to rounding.

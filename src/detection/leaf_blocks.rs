@@ -6,7 +6,7 @@ use crate::math::simd::Eight;
 use crate::parallel::Par;
 
 /// No primitive in this lane.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// Eight primitives with `N` vertices each: boxes, vertices and numbers by lane.
 #[derive(Clone, Debug)]
@@ -70,14 +70,15 @@ impl<const N: usize> Block<N> {
     }
 
     fn refit(&mut self, vertices: &[PackedBox]) {
-        for lane in 0..self.used {
+        let mut lanes = [PackedBox::NONE; 8];
+        for (lane, bounds) in lanes.iter_mut().enumerate().take(self.used) {
             let corners = self.corners(lane);
-            let mut bounds = vertices[corners[0] as usize];
+            *bounds = vertices[corners[0] as usize];
             for v in &corners[1..] {
-                bounds = bounds.union(&vertices[*v as usize]);
+                *bounds = bounds.union(&vertices[*v as usize]);
             }
-            bounds.write(&mut self.low, &mut self.high, lane);
         }
+        (self.low, self.high) = PackedBox::rows(&lanes);
     }
 }
 
@@ -130,6 +131,18 @@ impl<const N: usize> LeafBlocks<N> {
         let of_block =
             |block: &Block<N>| block.corners.iter().any(|row| row[..block.used].iter().any(|v| woken[*v as usize]));
         self.leaf(leaf).iter().any(of_block)
+    }
+
+    /// The box of all primitives of a leaf.
+    #[inline(always)]
+    pub fn bounds(&self, leaf: u32) -> PackedBox {
+        self.leaf(leaf).iter().fold(PackedBox::EMPTY, |all, block| all.union(&block.bounds()))
+    }
+
+    /// New boxes of one leaf.
+    pub fn refit_leaf(&mut self, leaf: u32, vertices: &[PackedBox]) {
+        let range = self.offsets[leaf as usize] as usize..self.offsets[leaf as usize + 1] as usize;
+        self.blocks[range].iter_mut().for_each(|block| block.refit(vertices));
     }
 
     /// New boxes: the unions of the boxes of the vertices. Cost: linear.

@@ -1,7 +1,7 @@
 //! All pairs of primitives of two leaves whose boxes overlap: the innermost loops of a traversal.
 
 use super::bvh::LEAF;
-use super::leaf_blocks::Block;
+use super::leaf_blocks::{Block, NONE};
 use super::pair_lists::PairBuffer;
 use super::primitives::Filter;
 use crate::geometry::Aabb;
@@ -17,6 +17,8 @@ pub(super) struct Side<'a, E> {
     pub boxes: &'a [Aabb],
     /// Asked for each pair, if at all.
     pub filter: Option<&'a Filter<'a>>,
+    /// Vertices that two primitives must not share, by index; none beyond the end. `None` for all.
+    pub apart_at: Option<&'a [bool]>,
     pub out: &'a mut PairBuffer,
 }
 
@@ -66,8 +68,8 @@ impl<E: Eight> Side<'_, E> {
         }
     }
 
-    /// One primitive with those of a block: keeps what is in the mask, overlaps exactly, shares no vertex and passes the
-    /// filter.
+    /// One primitive with those of a block: keeps what is in the mask, overlaps exactly, shares no vertex (of those that
+    /// count) and passes the filter.
     #[inline(always)]
     fn with<const N: usize, const M: usize, const ASCENDING: bool>(
         &mut self,
@@ -77,7 +79,15 @@ impl<E: Eight> Side<'_, E> {
         mask: u32,
     ) {
         let (query, corners) = (block.query(lane), block.corners(lane));
-        let mut hits = other.near(self.eight, &query) & mask & !other.sharing(self.eight, &corners);
+        let mut hits = other.near(self.eight, &query) & mask;
+        if hits == 0 {
+            return;
+        }
+        let mut unshared = corners;
+        if let Some(apart_at) = self.apart_at {
+            unshared = corners.map(|v| if apart_at.get(v as usize).is_some_and(|apart| *apart) { v } else { NONE });
+        }
+        hits &= !other.sharing(self.eight, &unshared);
         if hits == 0 {
             return;
         }

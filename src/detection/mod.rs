@@ -5,7 +5,7 @@
 //! * `ownership`, `bvh`, `leaf_blocks`, `leaf_pairs`, `pair_lists`, `broad_phase`: the same candidates by a tree of boxes
 //! * `proximity`: near pairs at a state, with weights, normals and distances
 //! * `screening`, `directions`: candidates that a separating direction rules out, several at once
-//! * `intersection`: the certificate, edges against faces by exact predicates
+//! * `intersection`, `stars`: the certificate, edges against faces by exact predicates
 //! * `ccd`: continuous detection of one pair
 
 mod broad_phase;
@@ -21,6 +21,8 @@ mod pair_lists;
 mod primitives;
 pub mod proximity;
 pub mod screening;
+mod stars;
 
 pub use broad_phase::{BroadPhase, Screen};
 pub use primitives::{Candidates, Filter, Motion, Primitives};
+pub use stars::Stars;

@@ -11,7 +11,7 @@ pub(super) struct Lists {
 
 impl Lists {
     /// From `(element, number)` pairs; `count` elements.
-    fn collect(count: usize, pairs: &[(u32, u32)]) -> Lists {
+    pub fn collect(count: usize, pairs: &[(u32, u32)]) -> Lists {
         let mut offsets = vec![0_u32; count + 2];
         for (element, _) in pairs {
             offsets[*element as usize + 2] += 1;
@@ -51,6 +51,8 @@ pub(super) struct Ownership {
     pub edges: Lists,
     /// Each face by itself, none for the other elements.
     pub faces: Lists,
+    /// Each edge of no face by itself, none for the other elements.
+    pub wires: Lists,
     /// Connected component of each element.
     pub components: Vec<u32>,
     /// A vertex of each component.
@@ -102,6 +104,9 @@ pub(super) fn own(primitives: &Primitives) -> Ownership {
         offsets: (0..=element).map(|e| e.min(faces.len() as u32)).collect(),
         numbers: (0..faces.len() as u32).collect(),
     };
+    let wires: Vec<(u32, u32)> =
+        out.loose_edges.iter().copied().zip(faces.len() as u32..).map(|(e, element)| (element, e)).collect();
+    out.wires = Lists::collect(element as usize, &wires);
     connect(&mut out, size, edges, faces);
     out
 }

@@ -11,7 +11,12 @@ pub(super) type PairLists = Vec<PairBuffer>;
 pub(super) struct PairBuffer {
     pairs: Vec<[u32; 2]>,
     used: usize,
+    /// Of these, screened already.
+    kept: usize,
 }
+
+/// Pairs that are many: as much as the nearest of the processor's caches holds.
+const MANY: usize = 4096;
 
 impl PairBuffer {
     /// Appends `[first, seconds[i]]` for the lanes of the mask; see [`Eight::pairs`].
@@ -25,14 +30,43 @@ impl PairBuffer {
         }
     }
 
+    /// Appends a pair.
+    pub fn push_one(&mut self, pair: [u32; 2]) {
+        if self.pairs.len() == self.used {
+            self.grow();
+        }
+        self.pairs[self.used] = pair;
+        self.used += 1;
+    }
+
+    /// Forgets all pairs.
+    pub fn clear(&mut self) {
+        (self.used, self.kept) = (0, 0);
+    }
+
     #[cold]
     fn grow(&mut self) {
         self.pairs.resize((2 * self.pairs.len()).max(512), [0; 2]);
     }
 
-    /// Keeps the pairs that `screen` moves to the front, as many as it says, and the memory for these alone.
-    pub fn keep(&mut self, screen: impl FnOnce(&mut [[u32; 2]]) -> usize) {
+    /// Whether there are so many that they should be screened while they are in the processor's cache.
+    pub fn is_many(&self) -> bool {
+        self.used >= MANY
+    }
+
+    /// Keeps the pairs that `screen` moves to the front, as many as it says.
+    pub fn screen(&mut self, screen: impl FnOnce(&mut [[u32; 2]]) -> usize) {
         self.used = screen(&mut self.pairs[..self.used]);
+    }
+
+    /// The same with the pairs added since the last time.
+    pub fn screen_new(&mut self, screen: impl FnOnce(&mut [[u32; 2]]) -> usize) {
+        self.kept += screen(&mut self.pairs[self.kept..self.used]);
+        self.used = self.kept;
+    }
+
+    /// Keeps the memory of the pairs alone.
+    pub fn shrink(&mut self) {
         self.pairs.truncate(self.used);
         self.pairs.shrink_to_fit();
     }

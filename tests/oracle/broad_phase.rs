@@ -8,24 +8,38 @@ use signorini::parallel::{Par, Pool};
 fn compare(scene: &Scene, tree: &mut BroadPhase, filter: &Filter, par: Par) -> usize {
     let p = scene.primitives();
     let motion = Motion { x0: &scene.x0, x1: &scene.x1, radius: &scene.radius };
-    let mut expected = brute_force::candidates(&p, &motion, filter);
-    expected.edge_face = brute_force::edge_face_candidates(&p, &motion, filter).edge_face;
+    let expected = brute_force::candidates(&p, &motion, filter);
     let mut found = Candidates::default();
     tree.refit(&scene.x0, &scene.x1, &scene.radius, par);
     tree.candidates(filter, &mut found, par);
-    found.edge_face = tree.edge_face_candidates(filter, &|pairs| pairs.len(), par);
     assert!(
         found == expected,
-        "{}: {} {} {} instead of {} {} {}",
+        "{}: {} {} instead of {} {}",
         scene.name,
         found.vertex_face.len(),
         found.edge_edge.len(),
-        found.edge_face.len(),
         expected.vertex_face.len(),
-        expected.edge_edge.len(),
-        expected.edge_face.len()
+        expected.edge_edge.len()
     );
+    compare_edges_with_faces(scene, tree, filter, par);
     found.vertex_face.len() + found.edge_edge.len()
+}
+
+/// All edge-face pairs with overlapping boxes are found; what else is found shares no vertex, passes the filter, and is found
+/// once.
+fn compare_edges_with_faces(scene: &Scene, tree: &mut BroadPhase, filter: &Filter, par: Par) {
+    let p = scene.primitives();
+    for x in [&scene.x0, &scene.x1] {
+        let motion = Motion { x0: x, x1: x, radius: &[] };
+        let expected = brute_force::edge_face_candidates(&p, &motion, filter).edge_face;
+        let found = tree.edge_face_candidates(x, &[], filter, [&|pairs| pairs.len(); 2], par);
+        assert!(expected.iter().all(|pair| found.binary_search(pair).is_ok()), "{}", scene.name);
+        for [edge, face] in &found {
+            let (edge, face) = (p.edges[*edge as usize], p.faces[*face as usize]);
+            assert!(filter(edge[0], face[0]) && !edge.iter().any(|v| face.contains(v)), "{}", scene.name);
+        }
+        assert!(found.windows(2).all(|two| two[0] < two[1]), "{}", scene.name);
+    }
 }
 
 #[test]
@@ -113,14 +127,17 @@ fn what_woken_vertices_meet_is_added() {
         }
         let motion = Motion { x0: &scene.x0, x1: &x1, radius: &scene.radius };
         let boxes: Vec<_> = (0..x1.len() as u32).map(|v| motion.vertex_box(v)).collect();
+        let mut partly = tree.clone();
+        partly.refit_woken(&woken, &boxes);
         tree.refit_to(&boxes, Par::Serial);
         for (filter, out) in filters.iter().zip(&mut kept) {
             let before = out.clone();
-            let (mut serial, mut pooled) = (out.clone(), out.clone());
+            let (mut serial, mut pooled, mut by_part) = (out.clone(), out.clone(), out.clone());
             tree.add_candidates(&woken, filter, &mut serial, Par::Serial);
+            partly.add_candidates(&woken, filter, &mut by_part, Par::Serial);
             tree.add_candidates(&woken, filter, &mut pooled, Par::Pool(&pool));
             let expected = brute_force::candidates(&p, &motion, filter);
-            assert!(serial == expected && pooled == expected, "{name}");
+            assert!(serial == expected && pooled == expected && by_part == expected, "{name}");
             added += serial.edge_edge.len() - before.edge_edge.len();
         }
     }

@@ -1,7 +1,7 @@
 //! The certificate's predicate against rational arithmetic by another route, and its search against brute force.
 
 use crate::random::Random;
-use crate::scenes::{Scene, scenes};
+use crate::scenes::{Scene, grid, scenes};
 use num_rational::BigRational as Q;
 use num_traits::{One, Signed, Zero};
 use signorini::detection::Primitives;
@@ -200,6 +200,66 @@ fn pairs_that_touch_to_the_last_bit_agree_with_brute_force() {
     assert_eq!(find(&p, &x, &own, Par::Serial), expected);
 }
 
+/// Stars about one vertex, of all numbers of faces, that turn on, back, or more than once about it: the pairs that clear
+/// stars leave out are none that touch.
+#[test]
+fn stars_that_fold_and_wind_agree_with_brute_force() {
+    let mut r = Random::new(28);
+    let (mut crossing, mut free) = (0, 0);
+    for i in 0..20_000 {
+        let count = 1 + i % 14;
+        let closed = count > 2 && r.pick(2) == 0;
+        let turns = [0.7, 1.0, 1.0, 1.3, 2.0][r.pick(5)];
+        let (rough, steep) = ([0.0, 0.0, 0.1, 0.6][r.pick(4)], [0.0, 0.1, 1.0][r.pick(3)]);
+        let (far, size) = ([0.0, 1.0, 1e3][r.pick(3)], [1.0, 1e-3][r.pick(2)]);
+        let away = scale(far, r.vector());
+        let [u, v, w] = [0; 3].map(|_| r.vector());
+        let mut at = |angle: f64, radius: f64| {
+            let angle = std::f64::consts::TAU * (angle + rough * (r.unit() - 0.5));
+            let height = steep * (r.unit() - 0.5);
+            let x = add_scaled(scale(radius * angle.cos(), u), radius * angle.sin(), v);
+            add_scaled(away, size, add_scaled(x, height, w))
+        };
+        let mut x = vec![at(0.0, 0.0)];
+        let ring = count + usize::from(!closed);
+        x.extend((0..ring).map(|k| at(turns * k as f64 / count as f64, 1.0 + 0.5 * (k % 3) as f64)));
+        // Far from it a point, so that single precision of the whole sees ever less of the star.
+        x.push(add_scaled(away, size * [1.0, 1e4, 1e5, 1e7][r.pick(4)], u));
+        let corner = |k: usize| 1 + (k % ring) as u32;
+        // Neither the order of the faces nor that of their corners matters.
+        let mut faces: Vec<[u32; 3]> = (0..count).map(|k| [0, corner(k), corner(k + 1)]).collect();
+        faces.rotate_left(r.pick(count));
+        faces.iter_mut().for_each(|f| f.rotate_left(r.pick(3)));
+        let mut edges: Vec<[u32; 2]> = (0..count).map(|k| [corner(k), corner(k + 1)]).collect();
+        edges.extend((0..ring).map(|k| [0, corner(k)]));
+        let vertices: Vec<u32> = (0..x.len() as u32).collect();
+        let p = Primitives { vertices: &vertices, edges: &edges, faces: &faces };
+        let expected = find_brute_force(&p, &x, &|_, _| true);
+        assert_eq!(find(&p, &x, &|_, _| true, Par::Serial), expected, "{i}: {x:?}");
+        *if expected.is_empty() { &mut free } else { &mut crossing } += 1;
+    }
+    assert!(crossing > 3000 && free > 3000, "{crossing} {free}");
+}
+
+/// Sheets that are crumpled ever more, from flat to a cloud.
+#[test]
+fn crumpled_sheets_agree_with_brute_force() {
+    let pool = Pool::new(2).unwrap();
+    let mut r = Random::new(29);
+    let mut crossing = 0;
+    for i in 0..60 {
+        let mut scene = grid("sheet", 14, 1 + i % 2);
+        let rough = 0.1 * [0.0, 0.1, 0.3, 0.5, 0.8, 2.0][i / 10];
+        scene.x0.iter_mut().for_each(|x| *x = add_scaled(*x, rough, r.vector()));
+        let p = scene.primitives();
+        let expected = find_brute_force(&p, &scene.x0, &|_, _| true);
+        let par = if i % 3 == 0 { Par::Pool(&pool) } else { Par::Serial };
+        assert_eq!(find(&p, &scene.x0, &|_, _| true, par), expected, "{i}");
+        crossing += usize::from(!expected.is_empty());
+    }
+    assert!((15..45).contains(&crossing), "{crossing}");
+}
+
 fn points_are_common(scene: &Scene, x: &[Vec3], found: &[signorini::detection::intersection::Intersection]) {
     for i in found {
         let [a, b, c] = scene.faces[i.face as usize].map(|v| x[v as usize]);
@@ -263,11 +323,22 @@ fn touches_that_single_precision_cannot_see_are_found() {
             faces.push([first + 2, first + 3, first + 4]);
         }
     }
+    // As segments of no face, and as sides of triangles, which are ruled out face against face.
+    let sides: Vec<[u32; 3]> = edges
+        .iter()
+        .map(|[p, q]| {
+            x.push(add_scaled(x[*q as usize], 0.3, signorini::math::sub(x[*q as usize], x[*p as usize + 2])));
+            [*p, *q, x.len() as u32 - 1]
+        })
+        .collect();
     let vertices: Vec<u32> = (0..x.len() as u32).collect();
-    let p = Primitives { vertices: &vertices, edges: &edges, faces: &faces };
-    for par in [Par::Serial, Par::Pool(&pool)] {
-        let found = find(&p, &x, &|_, _| true, par);
-        let own = found.iter().filter(|i| i.edge == i.face).count();
-        assert_eq!(own, edges.len());
+    for sides in [&[][..], &sides] {
+        let faces = [&faces, sides].concat();
+        let p = Primitives { vertices: &vertices, edges: &edges, faces: &faces };
+        for par in [Par::Serial, Par::Pool(&pool)] {
+            let found = find(&p, &x, &|_, _| true, par);
+            let own = found.iter().filter(|i| i.edge == i.face).count();
+            assert_eq!(own, edges.len());
+        }
     }
 }
