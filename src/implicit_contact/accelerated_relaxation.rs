@@ -7,6 +7,7 @@
 //! follows by the same combination. Iterations run in single precision on increments, or in double precision.
 
 use super::double_relaxation::DoubleRelaxation;
+use super::problem::ContactProblem;
 use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work};
 use super::single_relaxation::SingleRelaxation;
 use super::stop_test::{Ending, Run, Stagnation, StopTest, Verdict};
@@ -26,6 +27,8 @@ const PASSES_ALWAYS: u32 = 12;
 /// Iterations without halving the contact residual after which an iteration makes more passes. Where only the dynamics
 /// lag behind, passes would not help.
 const PASSES_PATIENCE: u32 = 30;
+/// The same where one component is alone: what folds of one cloth do not gain in these they hardly gain in more.
+const ALONE_PATIENCE: u32 = 20;
 /// Smallest tolerance for which iterations run in single precision.
 const SINGLE_FROM: f64 = 1e-5;
 /// Residuals above which stagnation ends the run. Below, a slow relaxation is still faster than the augmented Lagrangian,
@@ -135,10 +138,12 @@ struct PassSchedule {
 }
 
 impl PassSchedule {
-    fn new(blocks: usize, passes: Passes) -> PassSchedule {
+    fn new(problem: &ContactProblem, passes: Passes) -> PassSchedule {
         let most = PASSES.partition_point(|p| *p <= PASSES_ALWAYS) - 1;
         let level = if passes == Passes::Many { most } else { 0 };
-        PassSchedule { level, stagnation: Stagnation::new(PASSES_PATIENCE), blocks }
+        let several = problem.translations.is_some_and(|t| t.inverse_masses().len() > 1);
+        let patience = if several { PASSES_PATIENCE } else { ALONE_PATIENCE };
+        PassSchedule { level, stagnation: Stagnation::new(patience), blocks: problem.matrix.values.len() }
     }
 
     fn passes(&self) -> u32 {
@@ -183,7 +188,7 @@ pub(super) fn run(
         double(at, FIRST_SCALE)
     };
     let mut test = StopTest::new();
-    let mut schedule = PassSchedule::new(task.problem.matrix.values.len(), control.passes);
+    let mut schedule = PassSchedule::new(task.problem, control.passes);
     let mut stagnation = Stagnation::new(control.patience);
     let mut now = Iterate::default();
     let mut far = false;
