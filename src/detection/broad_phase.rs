@@ -315,7 +315,7 @@ impl EightKernel for Task<'_> {
                 if last || found.1.is_many() {
                     found.1.screen(of_faces);
                     self.expand(&mut found);
-                    found.0.screen_new(of_edges);
+                    found.0.screen(of_edges);
                 }
             }
         }

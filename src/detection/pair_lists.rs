@@ -54,13 +54,8 @@ impl PairBuffer {
         self.used >= MANY
     }
 
-    /// Keeps the pairs that `screen` moves to the front, as many as it says.
+    /// Keeps, of the pairs added since the last time, those that `screen` moves to the front, as many as it says.
     pub fn screen(&mut self, screen: impl FnOnce(&mut [[u32; 2]]) -> usize) {
-        self.used = screen(&mut self.pairs[..self.used]);
-    }
-
-    /// The same with the pairs added since the last time.
-    pub fn screen_new(&mut self, screen: impl FnOnce(&mut [[u32; 2]]) -> usize) {
         self.kept += screen(&mut self.pairs[self.kept..self.used]);
         self.used = self.kept;
     }
