@@ -1,14 +1,11 @@
 //! The matrix and right side of a deformable body's step.
 
-use crate::energy::{Elements, Forces, LANES, Pattern, Places, SideBySide, Stencil, TargetSpring};
+use crate::energy::{Elements, Forces, LANES, Part, Pattern, Places, SideBySide, Stencil, TargetSpring};
 use crate::linalg::BlockMatrix;
 use crate::math::simd::points::gather;
 use crate::math::simd::{Kernel, run_wide};
 use crate::math::{IDENTITY, Mat3, Vec3, ZERO_MATRIX, add_scaled, mat_add, mat_scale, mat_vec};
 use crate::parallel::Par;
-
-/// Stencils whose blocks are held at once where work is shared.
-const CHUNK: usize = 4096;
 
 /// What acts on a body from outside, uniform over it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,7 +29,8 @@ pub struct Assembled {
 ///
 /// Hessians are projected element by element, damping and drag are taken with their secants, so A is symmetric and at
 /// least M: positive definite. Linear damping cancels in b. `targets` holds where each attachment pulls to.
-/// Sums run in the order of the stencils whatever the threads. Cost: one pass over the stencils.
+/// Sums run in the order of the stencils whatever the threads. Cost: one pass over the stencils; on a pool those on
+/// borders between parts of [`Pattern`] are computed in each of them.
 pub fn assemble(
     forces: &Forces,
     pattern: &Pattern,
@@ -55,11 +53,15 @@ pub fn assemble(
     right.clear();
     right.resize(masses.len(), [0.0; 3]);
     let damping = forces.damping;
-    let (stretch, bend) = (dt * damping.stretch_time, dt * damping.bending_time);
-    add_stencils(&forces.springs, &pattern.springs, x, (dt * dt, stretch), (values, right), par);
-    add_stencils(&forces.membranes, &pattern.membranes, x, (dt * dt, stretch), (values, right), par);
-    add_stencils(&forces.hinges, &pattern.hinges, x, (dt * dt, bend), (values, right), par);
-    add_stencils(&forces.tetrahedra, &pattern.tetrahedra, x, (dt * dt, stretch), (values, right), par);
+    match par {
+        Par::Serial => {
+            add_part(forces, pattern, x, dt, &mut Rows { part: &pattern.whole, first_value: 0, values, right });
+        }
+        Par::Pool(_) => {
+            let mut tasks = rows_of_parts(&pattern.parts, row_offsets, values, right);
+            par.for_each_task(&mut tasks, |rows| add_part(forces, pattern, x, dt, rows));
+        }
+    }
     add_drag(forces, pattern, (x, v), around.wind, dt, values, right);
     for (attachment, target) in forces.attachments.iter().zip(targets) {
         let node = attachment.node as usize;
@@ -79,92 +81,119 @@ fn add_to(block: &mut Mat3, factor: f64, m: &Mat3) {
     *block = mat_add(block, &mat_scale(factor, m));
 }
 
-/// Adds the forces of every stencil, and `stiff H + viscous V`, in the order of the stencils.
-fn add_stencils<S: Stencil<N> + Sync, const N: usize>(
-    elements: &Elements<S, N>,
-    places: &[Places<N>],
-    x: &[Vec3],
-    factors: (f64, f64),
-    (values, right): (&mut [Mat3], &mut [Vec3]),
-    par: Par,
-) {
-    if let Par::Serial = par {
-        run_wide(AddAll { elements, places, x, factors, values, right });
-        return;
-    }
-    let mut start = 0;
-    while start < elements.len() {
-        let count = CHUNK.min(elements.len() - start);
-        let groups: Vec<SideBySide<N>> = par
-            .map_indexed(count.div_ceil(LANES), |i| run_wide(Four { elements, x, factors, first: start + LANES * i }));
-        for (i, four) in groups.iter().enumerate() {
-            scatter(elements, places, start + LANES * i, four, values, right);
-        }
-        start += count;
-    }
-}
-
-struct Four<'a, S, const N: usize> {
-    elements: &'a Elements<S, N>,
-    x: &'a [Vec3],
-    factors: (f64, f64),
-    first: usize,
-}
-
-impl<S: Stencil<N>, const N: usize> Kernel for Four<'_, S, N> {
-    type Output = SideBySide<N>;
-    #[inline(always)]
-    fn run(self) -> SideBySide<N> {
-        let Four { elements, x, factors, first } = self;
-        // Lanes beyond the last stencil repeat it.
-        let of_lane: [usize; LANES] = std::array::from_fn(|lane| (first + lane).min(elements.len() - 1));
-        let nodes = of_lane.map(|i| elements.nodes[i].map(|node| node as usize));
-        S::side_by_side(of_lane.map(|i| &elements.stencils[i]), &gather(x, &nodes), factors.0, factors.1)
-    }
-}
-
-struct AddAll<'a, S, const N: usize> {
-    elements: &'a Elements<S, N>,
-    places: &'a [Places<N>],
-    x: &'a [Vec3],
-    factors: (f64, f64),
+/// Rows of the system that one task fills.
+struct Rows<'a> {
+    part: &'a Part,
+    /// Place of the first of their values.
+    first_value: usize,
     values: &'a mut [Mat3],
     right: &'a mut [Vec3],
 }
 
-impl<S: Stencil<N>, const N: usize> Kernel for AddAll<'_, S, N> {
+/// The rows of all parts, which follow each other.
+fn rows_of_parts<'a>(
+    parts: &'a [Part],
+    row_offsets: &[usize],
+    mut values: &'a mut [Mat3],
+    mut right: &'a mut [Vec3],
+) -> Vec<Rows<'a>> {
+    let mut tasks = Vec::with_capacity(parts.len());
+    for part in parts {
+        let first_value = row_offsets[part.nodes.start];
+        let own = values.split_at_mut(row_offsets[part.nodes.end] - first_value);
+        let own_right = right.split_at_mut(part.nodes.len());
+        tasks.push(Rows { part, first_value, values: own.0, right: own_right.0 });
+        (values, right) = (own.1, own_right.1);
+    }
+    tasks
+}
+
+/// Adds to some rows what every stencil gives them, kind by kind.
+fn add_part(forces: &Forces, pattern: &Pattern, x: &[Vec3], dt: f64, rows: &mut Rows) {
+    let damping = forces.damping;
+    let (stretch, bend) = ((dt * dt, dt * damping.stretch_time), (dt * dt, dt * damping.bending_time));
+    let part = rows.part;
+    add_stencils(&forces.springs, &pattern.springs, &part.springs, x, stretch, rows);
+    add_stencils(&forces.membranes, &pattern.membranes, &part.membranes, x, stretch, rows);
+    add_stencils(&forces.hinges, &pattern.hinges, &part.hinges, x, bend, rows);
+    add_stencils(&forces.tetrahedra, &pattern.tetrahedra, &part.tetrahedra, x, stretch, rows);
+}
+
+/// Adds the forces of the stencils `list`, and `stiff H + viscous V`, in its order.
+fn add_stencils<S: Stencil<N>, const N: usize>(
+    elements: &Elements<S, N>,
+    places: &[Places<N>],
+    list: &[u32],
+    x: &[Vec3],
+    factors: (f64, f64),
+    rows: &mut Rows,
+) {
+    run_wide(AddAll { elements, places, list, x, factors, rows });
+}
+
+struct AddAll<'a, 'r, S, const N: usize> {
+    elements: &'a Elements<S, N>,
+    places: &'a [Places<N>],
+    list: &'a [u32],
+    x: &'a [Vec3],
+    factors: (f64, f64),
+    rows: &'a mut Rows<'r>,
+}
+
+impl<S: Stencil<N>, const N: usize> Kernel for AddAll<'_, '_, S, N> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let AddAll { elements, places, x, factors, values, right } = self;
-        for first in (0..elements.len()).step_by(LANES) {
-            let four = Four { elements, x, factors, first }.run();
-            scatter(elements, places, first, &four, values, right);
+        // Where all rows are here none has to be asked for.
+        if self.rows.right.len() == self.x.len() { self.add::<true>() } else { self.add::<false>() }
+    }
+}
+
+impl<S: Stencil<N>, const N: usize> AddAll<'_, '_, S, N> {
+    #[inline(always)]
+    fn add<const ALL: bool>(self) {
+        let AddAll { elements, places, list, x, factors, rows } = self;
+        for group in list.chunks(LANES) {
+            // Lanes beyond the last stencil repeat it.
+            let of_lane: [usize; LANES] = std::array::from_fn(|lane| group[lane.min(group.len() - 1)] as usize);
+            let nodes = of_lane.map(|i| elements.nodes[i].map(|node| node as usize));
+            let stencils = of_lane.map(|i| &elements.stencils[i]);
+            let four = S::side_by_side(stencils, &gather(x, &nodes), factors.0, factors.1);
+            for (lane, number) in of_lane.into_iter().take(group.len()).enumerate() {
+                scatter::<N, ALL>(&nodes[lane], &places[number], &four, lane, rows);
+            }
         }
     }
 }
 
+/// Adds one of the stencils side by side to the rows that are here.
 #[inline(always)]
-fn scatter<S, const N: usize>(
-    elements: &Elements<S, N>,
-    places: &[Places<N>],
-    first: usize,
+fn scatter<const N: usize, const ALL: bool>(
+    nodes: &[usize; N],
+    places: &Places<N>,
     four: &SideBySide<N>,
-    values: &mut [Mat3],
-    right: &mut [Vec3],
+    lane: usize,
+    rows: &mut Rows,
 ) {
-    for (lane, (nodes, places)) in elements.nodes[first..].iter().zip(&places[first..]).take(LANES).enumerate() {
-        for a in 0..N {
-            let force = &mut right[nodes[a] as usize];
-            (0..3).for_each(|c| force[c] += four.forces[a][c].0[lane]);
-            for b in 0..a {
-                let block = four.blocks[a][b].map(|row| row.map(|x| x.0[lane]));
-                let value = &mut values[places[a][b] as usize];
+    let Rows { part, first_value, values, right } = rows;
+    let here = nodes.map(|node| ALL || part.nodes.contains(&node));
+    let place = |a: usize, b: usize| places[a][b] as usize - *first_value;
+    for a in 0..N {
+        for b in 0..a {
+            let block = four.blocks[a][b].map(|row| row.map(|x| x.0[lane]));
+            if here[a] {
+                let value = &mut values[place(a, b)];
                 (0..3).for_each(|r| (0..3).for_each(|c| value[r][c] += block[r][c]));
-                let value = &mut values[places[b][a] as usize];
+            }
+            if here[b] {
+                let value = &mut values[place(b, a)];
                 (0..3).for_each(|r| (0..3).for_each(|c| value[r][c] += block[c][r]));
             }
-            let value = &mut values[places[a][a] as usize];
+        }
+        if here[a] {
+            let force = &mut right[nodes[a] - part.nodes.start];
+            (0..3).for_each(|c| force[c] += four.forces[a][c].0[lane]);
+            let value = &mut values[place(a, a)];
             (0..3).for_each(|r| (0..3).for_each(|c| value[r][c] += four.blocks[a][a][r][c].0[lane]));
         }
     }

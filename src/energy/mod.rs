@@ -35,7 +35,7 @@ pub use discrete_shell::Hinge;
 pub use forces::{Attachment, Elements, Forces, ForcesFault};
 pub use gravity::Gravity;
 pub use material::{MaterialFault, SheetMaterial, SolidMaterial};
-pub use pattern::{Pattern, Places};
+pub use pattern::{Part, Pattern, Places};
 pub use side_by_side::{Block, LANES, SideBySide};
 pub use spring::Spring;
 pub use stencil::{Blocks, HessianForm, Stencil};

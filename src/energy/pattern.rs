@@ -2,6 +2,14 @@
 
 use super::{Elements, Forces, Stencil};
 use crate::linalg::{BlockMatrix, Envelope};
+use std::ops::Range;
+
+/// Nodes of a part at least, and parts at most: what is shared by two parts is computed in both.
+const PART_NODES: usize = 1024;
+const PARTS_MAX: usize = 8;
+
+/// Parts that take more than this many quarters of the work of the whole are not worth it.
+const QUARTERS_MAX: usize = 5;
 
 /// Places of a stencil's blocks among the values of the matrix.
 pub type Places<const N: usize> = [[u32; N]; N];
@@ -23,6 +31,47 @@ pub struct Pattern {
     pub tetrahedra: Vec<Places<4>>,
     /// Places of the blocks of faces in the wind.
     pub drag: Vec<Places<3>>,
+    /// All rows.
+    pub whole: Part,
+    /// The same rows for several threads; the whole alone where nodes that lie next to each other are numbered far apart.
+    pub parts: Vec<Part>,
+}
+
+/// Consecutive rows of the matrix, and the stencils that add to them, ascending.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Part {
+    /// Nodes of the rows.
+    pub nodes: Range<usize>,
+    /// Springs.
+    pub springs: Vec<u32>,
+    /// Membranes.
+    pub membranes: Vec<u32>,
+    /// Hinges.
+    pub hinges: Vec<u32>,
+    /// Solids.
+    pub tetrahedra: Vec<u32>,
+}
+
+impl Part {
+    /// The rows of these nodes.
+    fn new(forces: &Forces, nodes: Range<usize>) -> Part {
+        fn touching<const N: usize>(stencils: &[[u32; N]], rows: &Range<usize>) -> Vec<u32> {
+            let touches = |nodes: &[u32; N]| nodes.iter().any(|node| rows.contains(&(*node as usize)));
+            (0..).zip(stencils).filter(|(_, nodes)| touches(nodes)).map(|(number, _)| number).collect()
+        }
+        Part {
+            springs: touching(&forces.springs.nodes, &nodes),
+            membranes: touching(&forces.membranes.nodes, &nodes),
+            hinges: touching(&forces.hinges.nodes, &nodes),
+            tetrahedra: touching(&forces.tetrahedra.nodes, &nodes),
+            nodes,
+        }
+    }
+
+    /// Stencils.
+    fn work(&self) -> usize {
+        self.springs.len() + self.membranes.len() + self.hinges.len() + self.tetrahedra.len()
+    }
 }
 
 impl Pattern {
@@ -42,6 +91,13 @@ impl Pattern {
         pattern.hinges = pattern.places(&forces.hinges);
         pattern.tetrahedra = pattern.places(&forces.tetrahedra);
         pattern.drag = forces.drag_faces.iter().map(|nodes| pattern.places_of(nodes)).collect();
+        pattern.whole = Part::new(forces, 0..count);
+        let parts = (count / PART_NODES).clamp(1, PARTS_MAX);
+        let part = |i: usize| Part::new(forces, i * count / parts..(i + 1) * count / parts);
+        pattern.parts = (0..parts).map(part).collect();
+        if 4 * pattern.parts.iter().map(Part::work).sum::<usize>() > QUARTERS_MAX * pattern.whole.work() {
+            pattern.parts = vec![pattern.whole.clone()];
+        }
         pattern
     }
 
