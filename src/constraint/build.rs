@@ -3,7 +3,7 @@
 use super::{Angular, Metric, RowSet};
 use crate::contact_search::{Contact, PairKind, distance_along, gather, weighted};
 use crate::kinematics::{chord_lever, turn};
-use crate::math::{Vec3, add, add_scaled, cross, dot, norm, scale, sub, tangents, unit};
+use crate::math::{Vec3, add_scaled, cross, dot, norm, scale, sub, tangents, unit};
 use crate::model::{Kind, Model, State};
 
 /// The tentative motion that rows are linearised about: exact there, whatever the levers.
@@ -18,6 +18,13 @@ pub struct Linearisation<'a> {
     pub unconstrained: &'a [Vec3],
     /// Duration `[s]`.
     pub dt: f64,
+}
+
+impl Linearisation<'_> {
+    /// What contacts changed of a block's velocity.
+    fn response(&self, block: usize) -> Vec3 {
+        sub(self.velocities[block], self.unconstrained[block])
+    }
 }
 
 /// Rows of the contacts that something movable feels, and the contact behind each.
@@ -44,24 +51,38 @@ pub fn build_rows(
     about: &Linearisation,
 ) -> BuiltRows {
     let mut built = BuiltRows::default();
-    built.rows.reserve(contacts.len());
-    built.contact.reserve(contacts.len());
-    built.rows.offsets.push(0);
-    built.rows.angular_offsets.push(0);
-    let response: Vec<Vec3> = about.velocities.iter().zip(about.unconstrained).map(|(v, u)| sub(*v, *u)).collect();
-    for (index, contact) in contacts.iter().enumerate() {
-        push_entries(model, metric, contact, about, &mut built.rows);
-        let (linear, angular) = (built.rows.blocks.len(), built.rows.angular.len());
-        let row = built.contact.len();
-        if linear == built.rows.offsets[row] as usize && angular == built.rows.angular_offsets[row] as usize {
-            continue;
-        }
-        built.rows.offsets.push(linear as u32);
-        built.rows.angular_offsets.push(angular as u32);
-        built.contact.push(index as u32);
-        push_targets(model, contact, required_gaps[index], frames[index], about, &response, &mut built.rows);
-    }
+    built.assign(model, metric, contacts, required_gaps, frames, about);
     built
+}
+
+impl BuiltRows {
+    /// Makes these the rows of [`build_rows`], in the room that there is.
+    pub fn assign(
+        &mut self,
+        model: &Model,
+        metric: &Metric,
+        contacts: &[Contact],
+        required_gaps: &[f64],
+        frames: &[Option<Vec3>],
+        about: &Linearisation,
+    ) {
+        let BuiltRows { rows, contact: built } = self;
+        rows.begin(contacts.len());
+        built.clear();
+        built.reserve(contacts.len());
+        for (index, contact) in contacts.iter().enumerate() {
+            push_entries(model, metric, contact, about, rows);
+            let (linear, angular) = (rows.blocks.len(), rows.angular.len());
+            let row = built.len();
+            if linear == rows.offsets[row] as usize && angular == rows.angular_offsets[row] as usize {
+                continue;
+            }
+            rows.offsets.push(linear as u32);
+            rows.angular_offsets.push(angular as u32);
+            built.push(index as u32);
+            push_targets(model, contact, required_gaps[index], frames[index], about, rows);
+        }
+    }
 }
 
 /// Linear and angular entries of one contact: a rigid body's vertices collapse into one of each.
@@ -127,7 +148,6 @@ fn push_targets(
     required_gap: f64,
     kept: Option<Vec3>,
     about: &Linearisation,
-    response: &[Vec3],
     rows: &mut RowSet,
 ) {
     let row = rows.frames.len();
@@ -138,7 +158,7 @@ fn push_targets(
         _ => weighted(&contact.weights, &moved),
     };
     // What the row would see without response: the tentative relative velocity less the response's share.
-    let seen = rows_relative_velocity(rows, response);
+    let seen = rows.relative_velocity_of(row, |block| about.response(block));
     let relative = sub(scale(1.0 / about.dt, displacement), seen);
     let n = contact.normal;
     let (t1, t2) = friction_frame(n, relative, kept);
@@ -151,19 +171,6 @@ fn push_targets(
     rows.sliding_velocities.push([dot(t1, relative), dot(t2, relative)]);
     rows.friction.push(friction_coefficient(model, contact));
     debug_assert_eq!(rows.frames.len(), row + 1);
-}
-
-/// `W v` of the row whose entries were pushed last.
-fn rows_relative_velocity(rows: &RowSet, v: &[Vec3]) -> Vec3 {
-    let row = rows.frames.len();
-    let mut u = [0.0; 3];
-    for k in rows.offsets[row] as usize..rows.offsets[row + 1] as usize {
-        u = add_scaled(u, rows.weights[k], v[rows.blocks[k] as usize]);
-    }
-    for a in &rows.angular[rows.angular_offsets[row] as usize..rows.angular_offsets[row + 1] as usize] {
-        u = add(u, cross(v[a.block as usize], a.lever));
-    }
-    u
 }
 
 /// Tangents of a contact: the first one kept from before if given, else along the unconstrained sliding velocity

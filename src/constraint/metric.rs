@@ -65,27 +65,37 @@ impl Metric {
         inverse_blocks(model, &self.matrix, &self.fixed, &mut self.inverse_diagonal)
     }
 
-    /// Blocks that impulses reach: those with one, and every block of a system that has one.
-    pub fn reached(&self, impulses: &[Vec3]) -> Vec<bool> {
-        let mut reached: Vec<bool> = impulses.iter().map(|f| *f != [0.0; 3]).collect();
-        let systems = self.system.iter().filter(|s| **s != u32::MAX).max().map_or(0, |s| *s as usize + 1);
-        let mut touched = vec![false; systems];
-        for (block, hit) in reached.iter().enumerate() {
+    /// Finds the blocks that impulses reach: those with one, and every block of a system that has one.
+    pub fn reached(&self, impulses: &[Vec3], out: &mut Reached) {
+        let Reached { blocks, systems } = out;
+        blocks.clear();
+        blocks.extend(impulses.iter().map(|f| *f != [0.0; 3]));
+        systems.clear();
+        systems.resize(self.system.iter().filter(|s| **s != u32::MAX).max().map_or(0, |s| *s as usize + 1), false);
+        for (block, hit) in blocks.iter().enumerate() {
             if *hit && self.system[block] != u32::MAX {
-                touched[self.system[block] as usize] = true;
+                systems[self.system[block] as usize] = true;
             }
         }
-        for (block, hit) in reached.iter_mut().enumerate() {
-            *hit |= self.system[block] != u32::MAX && touched[self.system[block] as usize];
+        for (block, hit) in blocks.iter_mut().enumerate() {
+            *hit |= self.system[block] != u32::MAX && systems[self.system[block] as usize];
             *hit &= !self.fixed[block];
         }
-        reached
     }
 
     /// `sum v_i · (A v)_i`: twice the kinetic energy for lumped masses `[J]`.
     pub fn norm_squared(&self, v: &[Vec3], par: Par) -> f64 {
         par.sum(v.len(), |i| if self.fixed[i] { 0.0 } else { crate::math::dot(v[i], self.matrix.row_product(i, v)) })
     }
+}
+
+/// What impulses reach.
+#[derive(Clone, Debug, Default)]
+pub struct Reached {
+    /// Blocks.
+    pub blocks: Vec<bool>,
+    /// Systems with an impulse.
+    systems: Vec<bool>,
 }
 
 /// Which blocks are velocities of points: all but the angular ones of rigid bodies.

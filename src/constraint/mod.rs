@@ -11,6 +11,6 @@ mod rows;
 mod translation;
 
 pub use build::{BuiltRows, Linearisation, build_rows, friction_frame};
-pub use metric::{Metric, momentum};
+pub use metric::{Metric, Reached, momentum};
 pub use rows::{Angular, RowSet};
 pub use translation::Translations;

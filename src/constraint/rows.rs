@@ -38,15 +38,27 @@ pub struct RowSet {
 }
 
 impl RowSet {
-    /// Makes room for this many contacts of four vertices each.
-    pub(super) fn reserve(&mut self, contacts: usize) {
-        self.offsets.reserve(contacts + 1);
-        self.blocks.reserve(4 * contacts);
-        self.weights.reserve(4 * contacts);
-        self.angular_offsets.reserve(contacts + 1);
-        self.frames.reserve(contacts);
+    /// Leaves no row, and makes room for this many contacts of four vertices each.
+    pub(super) fn begin(&mut self, contacts: usize) {
+        let RowSet { offsets, blocks, weights, angular_offsets, angular, frames, .. } = self;
+        offsets.clear();
+        offsets.reserve(contacts + 1);
+        offsets.push(0);
+        blocks.clear();
+        blocks.reserve(4 * contacts);
+        weights.clear();
+        weights.reserve(4 * contacts);
+        angular_offsets.clear();
+        angular_offsets.reserve(contacts + 1);
+        angular_offsets.push(0);
+        angular.clear();
+        frames.clear();
+        frames.reserve(contacts);
+        self.normal_targets.clear();
         self.normal_targets.reserve(contacts);
+        self.sliding_velocities.clear();
         self.sliding_velocities.reserve(contacts);
+        self.friction.clear();
         self.friction.reserve(contacts);
     }
 
@@ -63,12 +75,18 @@ impl RowSet {
     /// Relative velocity `W_i v` of contact `i` `[m/s]`, world frame.
     #[inline]
     pub fn relative_velocity(&self, i: usize, v: &[Vec3]) -> Vec3 {
+        self.relative_velocity_of(i, |block| v[block])
+    }
+
+    /// The same where `v` gives the velocity of a block.
+    #[inline]
+    pub fn relative_velocity_of(&self, i: usize, v: impl Fn(usize) -> Vec3) -> Vec3 {
         let mut u = [0.0; 3];
         for k in self.offsets[i] as usize..self.offsets[i + 1] as usize {
-            u = add_scaled(u, self.weights[k], v[self.blocks[k] as usize]);
+            u = add_scaled(u, self.weights[k], v(self.blocks[k] as usize));
         }
         for a in &self.angular[self.angular_offsets[i] as usize..self.angular_offsets[i + 1] as usize] {
-            u = add(u, cross(v[a.block as usize], a.lever));
+            u = add(u, cross(v(a.block as usize), a.lever));
         }
         u
     }

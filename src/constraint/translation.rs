@@ -67,12 +67,20 @@ impl Translations {
     /// It is the correction that brings `dv` closest to the solution of `A dv = impulses` in the norm of A. Stiffness
     /// does not feel a translation of the whole, so that what the masses gain is then what contacts gave, to rounding.
     pub fn missing(&self, impulses: &[Vec3], product: &[Vec3]) -> Vec<Vec3> {
-        let mut missing = vec![[0.0; 3]; self.inverse_masses.len()];
+        let mut missing = Vec::new();
+        self.missing_into(impulses, product, &mut missing);
+        missing
+    }
+
+    /// The same in the memory of `missing`.
+    pub fn missing_into(&self, impulses: &[Vec3], product: &[Vec3], missing: &mut Vec<Vec3>) {
+        missing.clear();
+        missing.resize(self.inverse_masses.len(), [0.0; 3]);
         for (row, component) in self.component.iter().enumerate().filter(|(_, c)| **c != NONE) {
             let sum = &mut missing[*component as usize];
             *sum = add(*sum, sub(impulses[row], product[row]));
         }
-        missing.iter().zip(&self.inverse_masses).map(|(r, m)| mat_vec(m, *r)).collect()
+        missing.iter_mut().zip(&self.inverse_masses).for_each(|(r, m)| *r = mat_vec(m, *r));
     }
 
     /// The component that block `b` belongs to.

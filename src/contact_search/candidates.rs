@@ -1,8 +1,9 @@
 //! Candidate pairs of a segment, kept over rounds and steps while every vertex stays in the box they were found for.
 
+use super::distinct::Borders;
 use super::pair::BodyFilter;
 use crate::detection::intersection::{Intersection, find_with};
-use crate::detection::{BroadPhase, Candidates, Primitives, Stars};
+use crate::detection::{BroadPhase, Candidates, Primitives, Stars, screening};
 use crate::geometry::Aabb;
 use crate::math::{Vec3, is_finite};
 use crate::model::Model;
@@ -17,6 +18,46 @@ pub struct CandidateSearch {
     anchor: Option<Anchor>,
     /// Vertices outside their boxes, of the call that runs.
     outside: Vec<bool>,
+    buffers: Buffers,
+}
+
+/// Candidates, with buffers for what is asked about them.
+pub struct Found<'a> {
+    /// The pairs.
+    pub candidates: &'a Candidates,
+    /// Capacity only.
+    pub buffers: &'a mut Buffers,
+}
+
+/// Buffers of near contacts and of sweeps: capacity only, emptying them changes no bit.
+#[derive(Default)]
+pub struct Buffers {
+    /// By vertex, factor times half thickness `[m]`.
+    reach: Vec<f64>,
+    screening: screening::Buffers,
+    borders: Borders,
+}
+
+impl Found<'_> {
+    /// The same candidates once more.
+    pub fn again(&mut self) -> Found<'_> {
+        Found { candidates: self.candidates, buffers: self.buffers }
+    }
+
+    /// Numbers of those that may be nearer at `x` than `factor` times their thickness, ascending; and the buffers of what
+    /// is next.
+    pub(super) fn near(&mut self, model: &Model, x: &[Vec3], factor: f64, par: Par) -> (&[u32], &mut Borders) {
+        let Buffers { reach, screening, borders } = &mut *self.buffers;
+        half_thicknesses(model, factor, reach);
+        (screening::near(x, &primitives(model), self.candidates, reach, screening, par), borders)
+    }
+
+    /// Numbers of those that may come closer than continuous detection allows on the way from `x0` to `x1`, ascending.
+    pub(super) fn approaching(&mut self, model: &Model, x0: &[Vec3], x1: &[Vec3], par: Par) -> &[u32] {
+        let Buffers { reach, screening, .. } = &mut *self.buffers;
+        half_thicknesses(model, 1.0, reach);
+        screening::approaching(x0, x1, &primitives(model), self.candidates, reach, screening, par)
+    }
 }
 
 /// What the meshes of a model are searched by.
@@ -64,14 +105,19 @@ impl CandidateSearch {
         x1: &[Vec3],
         factor: f64,
         par: Par,
-    ) -> &Candidates {
+    ) -> Found<'_> {
+        self.find(model, filter, x0, x1, factor, par);
+        Found { candidates: &self.candidates, buffers: &mut self.buffers }
+    }
+
+    fn find(&mut self, model: &Model, filter: &BodyFilter, x0: &[Vec3], x1: &[Vec3], factor: f64, par: Par) {
         if let Some(anchor) = self.anchor.as_mut().filter(|anchor| anchor.is_for(model, filter, factor, x0.len())) {
             let outside = &mut self.outside;
             outside.resize(x0.len(), false);
             par.map_into(outside, |v| anchor.is_left(v, model, x0[v], x1[v], factor));
             let count = outside.iter().filter(|left| **left).count();
             if count == 0 {
-                return &self.candidates;
+                return;
             }
             let pairs = self.candidates.vertex_face.len() + self.candidates.edge_edge.len();
             let grown = pairs > anchor.pairs + anchor.pairs / 4;
@@ -92,12 +138,13 @@ impl CandidateSearch {
                 anchor.fitted = true;
                 let allowed = |a, b| allowed(model, filter, a, b);
                 broad_phase.add_candidates(outside, &allowed, &mut self.candidates, par);
-                return &self.candidates;
+                return;
             }
         }
-        let radius = half_thicknesses(model, factor + 1.0);
+        let radius = &mut self.buffers.reach;
+        half_thicknesses(model, factor + 1.0, radius);
         let broad_phase = &mut meshes(&mut self.meshes, model).tree;
-        broad_phase.refit(x0, x1, &radius, par);
+        broad_phase.refit(x0, x1, radius, par);
         broad_phase.candidates(&|a, b| allowed(model, filter, a, b), &mut self.candidates, par);
         let mut boxes = self.anchor.take().map(|anchor| anchor.boxes).unwrap_or_default();
         boxes.clear();
@@ -105,7 +152,6 @@ impl CandidateSearch {
         let (topology, filter) = (model.topology_hash, filter.fingerprint());
         let pairs = self.candidates.vertex_face.len() + self.candidates.edge_edge.len();
         self.anchor = Some(Anchor { topology, filter, factor, boxes, fitted: true, pairs, widened: 0 });
-        &self.candidates
     }
 
     /// Edges and faces that share a point at `x`, by the same tree and exactly.
@@ -179,8 +225,9 @@ pub fn primitives(model: &Model) -> Primitives<'_> {
 }
 
 /// `factor` times the half thickness of every vertex's body `[m]`.
-pub(super) fn half_thicknesses(model: &Model, factor: f64) -> Vec<f64> {
-    model.vertex_body.iter().map(|b| factor * model.bodies[*b as usize].half_thickness).collect()
+fn half_thicknesses(model: &Model, factor: f64, out: &mut Vec<f64>) {
+    out.clear();
+    out.extend(model.vertex_body.iter().map(|b| factor * model.bodies[*b as usize].half_thickness));
 }
 
 #[cfg(test)]

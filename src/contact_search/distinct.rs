@@ -13,12 +13,11 @@ use std::sync::atomic::{AtomicU8, Ordering};
 /// first pair is kept, with the largest thickness. They are no contact of their own where a face at that border is
 /// strictly nearer to `p`: then the point slides off the border into the face, which has its own row. A vertex that is
 /// nearest to an edge or a corner keeps that row. Of two vertices both must have something nearer. Cost: linear.
-pub(super) fn distinct(contacts: &mut Vec<Contact>, par: Par) {
+pub(super) fn distinct(contacts: &mut Vec<Contact>, borders: &mut Borders, par: Par) {
     if contacts.is_empty() {
         return;
     }
-    let mut kept = vec![true; contacts.len()];
-    let mut borders = Borders::for_contacts(contacts.len());
+    borders.empty(contacts.len());
     for i in 0..contacts.len() {
         let Some(border) = Border::of(&contacts[i], i) else { continue };
         // The same vertices may carry two contacts on opposite sides only if the normals differ.
@@ -26,7 +25,7 @@ pub(super) fn distinct(contacts: &mut Vec<Contact>, par: Par) {
             Some(first) => {
                 let first = first.contact;
                 contacts[first].thickness = contacts[first].thickness.max(contacts[i].thickness);
-                kept[i] = false;
+                borders.kept[i] = false;
             }
             None => borders.insert(border),
         }
@@ -35,10 +34,10 @@ pub(super) fn distinct(contacts: &mut Vec<Contact>, par: Par) {
     par.for_each_block(&mut contacts[..faces], |_, contacts| {
         contacts.iter().for_each(|c| borders.mark_farther_than(c))
     });
-    let both = Border::BOTH;
-    borders.list.iter().filter(|b| b.nearer.load(Ordering::Relaxed) == both).for_each(|b| kept[b.contact] = false);
-    let mut keep = kept.into_iter();
-    contacts.retain(|_| keep.next().unwrap_or(true));
+    let Borders { list, kept, .. } = borders;
+    list.iter().filter(|b| b.nearer.load(Ordering::Relaxed) == Border::BOTH).for_each(|b| kept[b.contact] = false);
+    let mut keep = kept.iter();
+    contacts.retain(|_| *keep.next().unwrap_or(&true));
 }
 
 /// A contact between a vertex and an edge or another vertex.
@@ -82,19 +81,26 @@ impl Border {
     }
 }
 
-/// Borders by key. Several may have the same one.
-struct Borders {
+/// Borders by key, of the contacts of one list. Several may have the same one.
+#[derive(Default)]
+pub(super) struct Borders {
     list: Vec<Border>,
     /// Numbers in the list, by hash and then in the order of insertion; [`EMPTY`] behind the last of each.
     slots: Vec<u32>,
+    /// Which contacts stay.
+    kept: Vec<bool>,
 }
 
 const EMPTY: u32 = u32::MAX;
 
 impl Borders {
-    /// Room for the borders of so many contacts.
-    fn for_contacts(count: usize) -> Borders {
-        Borders { list: Vec::new(), slots: vec![EMPTY; (count + count / 2 + 2).next_power_of_two()] }
+    /// No border yet, and room for those of so many contacts, which all stay so far.
+    fn empty(&mut self, count: usize) {
+        self.list.clear();
+        self.slots.clear();
+        self.slots.resize((count + count / 2 + 2).next_power_of_two(), EMPTY);
+        self.kept.clear();
+        self.kept.resize(count, true);
     }
 
     /// The slots of a key and what follows them, from its hash on.
@@ -187,7 +193,7 @@ mod tests {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (state >> 33) % n
         };
-        let mut shorter = 0;
+        let (mut shorter, mut borders) = (0, Borders::default());
         for round in 0..300 {
             // Few vertices, so that borders are shared and nearly every slot of the table is asked for.
             let vertices = 5 + round % 9;
@@ -221,7 +227,7 @@ mod tests {
                 .collect();
             contacts.sort_by_key(|c| c.pair);
             let (expected, all) = (by_brute_force(&contacts), contacts.len());
-            distinct(&mut contacts, Par::Serial);
+            distinct(&mut contacts, &mut borders, Par::Serial);
             assert_eq!(contacts, expected, "round {round}");
             shorter += usize::from(contacts.len() < all);
         }

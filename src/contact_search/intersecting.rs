@@ -98,6 +98,6 @@ fn touches_at_rest(model: &Model, edge: [u32; 2], face: [u32; 3]) -> bool {
 /// Cost: a broad phase over the sweep and continuous detection of its candidates.
 pub fn swept_free(model: &Model, filter: &BodyFilter, before: &State, after: &State, par: Par) -> Vec<Hit> {
     let mut search = CandidateSearch::default();
-    let candidates = search.update(model, filter, &before.positions, &after.positions, 1.0, par);
-    swept_hits(model, filter, &Passing::default(), candidates, before, after, par)
+    let found = search.update(model, filter, &before.positions, &after.positions, 1.0, par);
+    swept_hits(model, filter, &Passing::default(), found, before, after, par)
 }

@@ -18,7 +18,7 @@ mod pair;
 mod passing;
 mod swept;
 
-pub use candidates::{CandidateSearch, primitives};
+pub use candidates::{Buffers, CandidateSearch, Found, primitives};
 pub use contact::{Contact, half_space_contact, mesh_contact};
 pub use intersecting::{Tangle, intersections, intersections_with, swept_free};
 pub use near::near_contacts;

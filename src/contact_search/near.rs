@@ -1,11 +1,11 @@
 //! Contacts near the start positions of a segment [Otaduy09, §3.2 (i)].
 
-use super::candidates::{half_thicknesses, primitives};
+use super::candidates::Found;
 use super::contact::{Contact, half_space_contact, mesh_contact};
 use super::distinct::distinct;
 use super::pair::{BodyFilter, Pair, PairKind, gather};
 use super::passing::Passing;
-use crate::detection::{Candidates, screening};
+use crate::detection::Candidates;
 use crate::math::Vec3;
 use crate::model::{Kind, Model, State};
 use crate::parallel::Par;
@@ -14,29 +14,30 @@ use crate::parallel::Par;
 /// vertices near half-spaces.
 ///
 /// Pairs whose closest points lie on vertices or edges describe the same contact many times; one is kept, and none where
-/// a face is nearer. Cost: linear in candidates, plus a sort of these.
+/// a face is nearer. Cost: linear in candidates, plus a sort of these; `contacts` is written over.
 pub fn near_contacts(
     model: &Model,
     filter: &BodyFilter,
     passing: &Passing,
-    candidates: &Candidates,
+    mut found: Found,
     start: &State,
     end: &State,
     factor: f64,
+    contacts: &mut Vec<Contact>,
     par: Par,
-) -> Vec<Contact> {
-    let x = &start.positions;
-    let open = screening::near(x, &primitives(model), candidates, &half_thicknesses(model, factor), par);
+) {
+    let (x, candidates) = (&start.positions, found.candidates);
+    let (open, borders) = found.near(model, x, factor, par);
     let near = |i: usize| near_mesh_pair(model, passing, candidate(candidates, open[i] as usize), x, factor);
-    let mut contacts = par.filter_indexed(open.len(), near);
-    distinct(&mut contacts, par);
+    contacts.clear();
+    par.extend_filtered(contacts, open.len(), near);
+    distinct(contacts, borders, par);
     for plane in half_spaces(model) {
-        contacts.extend(par.filter_indexed(model.contact_vertices.len(), |i| {
+        par.extend_filtered(contacts, model.contact_vertices.len(), |i| {
             let pair = half_space_pair(model, filter, i, plane)?;
             near_half_space(model, passing, pair, start, end, factor)
-        }));
+        });
     }
-    contacts
 }
 
 /// Candidate number `i`, vertex-face pairs first.

@@ -222,7 +222,7 @@ pub fn is_immovable(body: &Body) -> bool {
 }
 
 /// Which bodies may touch: groups and masks, self-collision, and at least one of the two can move.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct BodyFilter {
     groups: Vec<u64>,
     masks: Vec<u64>,
@@ -237,21 +237,26 @@ pub struct BodyFilter {
 impl BodyFilter {
     /// The filter of a model. Cost: linear in bodies.
     pub fn new(model: &Model) -> BodyFilter {
-        let of = |f: &dyn Fn(&Body) -> u64| model.bodies.iter().map(f).collect();
-        BodyFilter {
-            groups: of(&|b| b.description.groups),
-            masks: of(&|b| b.description.mask),
-            collides_with_itself: model
-                .bodies
-                .iter()
-                .map(|b| b.description.self_collision && matches!(b.description.kind, Kind::Deformable { .. }))
-                .collect(),
-            immovable: model.bodies.iter().map(is_immovable).collect(),
-            scripts: Vec::new(),
-            only: None,
-            fingerprint: 0,
+        let mut filter = BodyFilter::default();
+        filter.assign(model);
+        filter
+    }
+
+    /// Makes this the filter of a model. Cost: linear in bodies.
+    pub fn assign(&mut self, model: &Model) {
+        fn fill<T>(list: &mut Vec<T>, model: &Model, of: impl Fn(&Body) -> T) {
+            list.clear();
+            list.extend(model.bodies.iter().map(of));
         }
-        .with_fingerprint(model)
+        let meets_itself =
+            |b: &Body| b.description.self_collision && matches!(b.description.kind, Kind::Deformable { .. });
+        fill(&mut self.groups, model, |b| b.description.groups);
+        fill(&mut self.masks, model, |b| b.description.mask);
+        fill(&mut self.collides_with_itself, model, meets_itself);
+        fill(&mut self.immovable, model, is_immovable);
+        self.scripts.clear();
+        self.only = None;
+        self.find_fingerprint(model);
     }
 
     /// This filter on pairs with something scripted alone (kinematic bodies, half-spaces), or on all others alone.
@@ -259,7 +264,8 @@ impl BodyFilter {
         let is_script = |b: &Body| matches!(b.description.kind, Kind::Kinematic { .. } | Kind::HalfSpace(_));
         let mut only = BodyFilter { only: Some(scripted), ..self.clone() };
         only.scripts = model.bodies.iter().map(is_script).collect();
-        only.with_fingerprint(model)
+        only.find_fingerprint(model);
+        only
     }
 
     /// A number that changes with anything here, with the bodies' vertex ranges or with their thickness: what was found
@@ -269,7 +275,7 @@ impl BodyFilter {
         self.fingerprint
     }
 
-    fn with_fingerprint(mut self, model: &Model) -> BodyFilter {
+    fn find_fingerprint(&mut self, model: &Model) {
         // FNV-1a over words.
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         for (i, body) in model.bodies.iter().enumerate() {
@@ -279,7 +285,6 @@ impl BodyFilter {
             words.iter().for_each(|word| hash = (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3));
         }
         self.fingerprint = hash;
-        self
     }
 
     /// Whether bodies `a` and `b` may touch.

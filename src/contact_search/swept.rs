@@ -1,12 +1,12 @@
 //! Continuous detection of a segment: which pairs come closer than their minimum separation on straight chords.
 
-use super::candidates::{half_thicknesses, primitives};
+use super::candidates::{Found, primitives};
 use super::contact::{Contact, half_space_contact, mesh_contact};
 use super::near::{candidate, half_space_pair, half_spaces};
 use super::pair::{BodyFilter, Pair, PairKind, gather};
 use super::passing::Passing;
+use crate::detection::Candidates;
 use crate::detection::ccd::{self, Separation};
-use crate::detection::{Candidates, screening};
 use crate::math::predicates::plane_side;
 use crate::math::{Vec3, lerp};
 use crate::model::{Model, State, Witness};
@@ -46,19 +46,20 @@ pub fn swept_hits(
     model: &Model,
     filter: &BodyFilter,
     passing: &Passing,
-    candidates: &Candidates,
+    mut found: Found,
     start: &State,
     end: &State,
     par: Par,
 ) -> Vec<Hit> {
     let (x0, x1) = (&start.positions[..], &end.positions[..]);
-    let open = screening::approaching(x0, x1, &primitives(model), candidates, &half_thicknesses(model, 1.0), par);
+    let candidates = found.candidates;
+    let open = found.approaching(model, x0, x1, par);
     let ask = |i: usize| question(model, passing, candidate(candidates, open[i] as usize), x0, x1);
     let questions = par.filter_indexed(open.len(), ask);
     let mut hits = mesh_hits(model, &questions, x0, x1, par);
     for plane in half_spaces(model) {
         let hit = |i: usize| half_space_hit(model, passing, half_space_pair(model, filter, i, plane)?, start, end);
-        hits.extend(par.filter_indexed(model.contact_vertices.len(), hit));
+        par.extend_filtered(&mut hits, model.contact_vertices.len(), hit);
     }
     hits
 }
@@ -72,7 +73,7 @@ pub fn renewed_hits(
     model: &Model,
     filter: &BodyFilter,
     passing: &Passing,
-    candidates: &Candidates,
+    found: Found,
     (start, end): (&State, &State),
     before: &[Hit],
     moved: &[bool],
@@ -85,12 +86,13 @@ pub fn renewed_hits(
         let touched = |[a, b]: [u32; 2]| first[a as usize] || second[b as usize];
         par.filter_indexed(list.len(), |i| touched(list[i]).then_some(list[i]))
     };
+    let Found { candidates, buffers } = found;
     let open = Candidates {
         vertex_face: pairs(&candidates.vertex_face, moved, &faces),
         edge_edge: pairs(&candidates.edge_edge, &edges, &edges),
         ..Candidates::default()
     };
-    let mut hits = swept_hits(model, filter, passing, &open, start, end, par);
+    let mut hits = swept_hits(model, filter, passing, Found { candidates: &open, buffers }, start, end, par);
     // Half-spaces are all tested anew: that costs less than to sort them out.
     let on_mesh = |hit: &Hit| hit.pair.kind != PairKind::VertexHalfSpace;
     let half_spaces = hits.split_off(hits.partition_point(on_mesh));

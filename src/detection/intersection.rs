@@ -50,7 +50,8 @@ pub fn find_with(
     filter: &Filter,
     par: Par,
 ) -> Vec<Intersection> {
-    let coarse = Coarse::new(x, None, &[], par);
+    let mut coarse = Coarse::default();
+    coarse.assign(x, None, &[], par);
     let x0 = &coarse.x0;
     let apart = |pairs: &mut [[u32; 2]]| run_wide(RuleOutFaces { primitives, coarse: x0, pairs });
     let rule_out = |pairs: &mut [[u32; 2]]| run_wide(RuleOut { primitives, x, coarse: x0, pairs });

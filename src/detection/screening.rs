@@ -50,39 +50,65 @@ const COARSE_SHARE: f64 = 0.01;
 /// first, ascending. `reach` is by vertex index and the same for all vertices of a primitive `[m]`.
 ///
 /// None that is nearer is left out, by exact distance or by that of [`crate::geometry`]. Cost: linear.
-pub fn near(x: &[Vec3], primitives: &Primitives, candidates: &Candidates, reach: &[f64], par: Par) -> Vec<u32> {
+pub fn near<'a>(
+    x: &[Vec3],
+    primitives: &Primitives,
+    candidates: &Candidates,
+    reach: &[f64],
+    buffers: &'a mut Buffers,
+    par: Par,
+) -> &'a [u32] {
     let lists = Lists { primitives, candidates };
-    let mut open = lists.all();
-    if open.is_empty() {
-        return open;
+    let Buffers { coarse, open } = buffers;
+    open.take(lists);
+    if open.numbers.is_empty() {
+        return &open.numbers;
     }
-    let coarse = Coarse::new(x, None, reach, par);
-    lists.rule_out::<COARSE_WIDTH, _>(&coarse, &mut open, par);
+    coarse.assign(x, None, reach, par);
+    open.rule_out::<COARSE_WIDTH, _>(lists, coarse, par);
     let smallest = reach.iter().fold(f64::INFINITY, |a, b| a.min(*b));
     if f64::from(COARSE_ERROR) > COARSE_SHARE * smallest * coarse.per_metre {
-        lists.rule_out::<WIDTH, _>(&Fine { x0: x, x1: None, reach }, &mut open, par);
+        open.rule_out::<WIDTH, _>(lists, &Fine { x0: x, x1: None, reach }, par);
     }
-    open
+    &open.numbers
 }
 
 /// Numbers of the candidates that may come closer than half of `min(thickness, distance at x0)` on straight lines from
 /// `x0` to `x1`, where `thickness` is the sum of both primitives' half thicknesses; otherwise like [`near`].
-pub fn approaching(
+pub fn approaching<'a>(
     x0: &[Vec3],
     x1: &[Vec3],
     primitives: &Primitives,
     candidates: &Candidates,
     half_thickness: &[f64],
+    buffers: &'a mut Buffers,
     par: Par,
-) -> Vec<u32> {
+) -> &'a [u32] {
     let lists = Lists { primitives, candidates };
-    let mut open = lists.all();
-    if open.is_empty() {
-        return open;
+    let Buffers { coarse, open } = buffers;
+    open.take(lists);
+    if open.numbers.is_empty() {
+        return &open.numbers;
     }
-    lists.rule_out::<COARSE_WIDTH, _>(&Coarse::new(x0, Some(x1), half_thickness, par), &mut open, par);
-    lists.rule_out::<WIDTH, _>(&Fine { x0, x1: Some(x1), reach: half_thickness }, &mut open, par);
-    open
+    coarse.assign(x0, Some(x1), half_thickness, par);
+    open.rule_out::<COARSE_WIDTH, _>(lists, coarse, par);
+    open.rule_out::<WIDTH, _>(lists, &Fine { x0, x1: Some(x1), reach: half_thickness }, par);
+    &open.numbers
+}
+
+/// What is used again from call to call: capacity only.
+#[derive(Default)]
+pub struct Buffers {
+    coarse: Coarse,
+    open: Open,
+}
+
+/// Numbers of the candidates that are still open, ascending.
+#[derive(Default)]
+struct Open {
+    numbers: Vec<u32>,
+    /// How many of each block a screen left.
+    left: Vec<usize>,
 }
 
 /// A test of `L` pairs side by side, given by the indices of their vertices.
@@ -99,24 +125,29 @@ struct Lists<'a> {
     candidates: &'a Candidates,
 }
 
-impl Lists<'_> {
-    fn all(&self) -> Vec<u32> {
-        (0..(self.candidates.vertex_face.len() + self.candidates.edge_edge.len()) as u32).collect()
+impl Open {
+    /// All candidates.
+    fn take(&mut self, lists: Lists) {
+        self.numbers.clear();
+        self.numbers.extend(0..(lists.candidates.vertex_face.len() + lists.candidates.edge_edge.len()) as u32);
     }
 
-    /// Leaves those of the ascending numbers that the screen does not rule out.
-    fn rule_out<const L: usize, S: Screen<L>>(&self, screen: &S, numbers: &mut Vec<u32>, par: Par) {
-        let mut left = Vec::with_capacity(numbers.len().div_ceil(BLOCK));
-        let screened = |numbers| run_wide(Block::<L, S> { lists: *self, screen, numbers });
+    /// Leaves those that the screen does not rule out.
+    fn rule_out<const L: usize, S: Screen<L>>(&mut self, lists: Lists, screen: &S, par: Par) {
+        let Open { numbers, left } = self;
+        left.clear();
+        let screened = |numbers| run_wide(Block::<L, S> { lists, screen, numbers });
         par.fold_tasks(numbers.chunks_mut(BLOCK), screened, |count: usize| left.push(count));
         let mut filled = 0;
-        for (block, left) in left.into_iter().enumerate() {
+        for (block, left) in left.iter().enumerate() {
             numbers.copy_within(block * BLOCK..block * BLOCK + left, filled);
             filled += left;
         }
         numbers.truncate(filled);
     }
+}
 
+impl Lists<'_> {
     #[inline(always)]
     fn vertices(&self, shape: Shape, number: u32) -> [usize; 4] {
         let number = number as usize;
@@ -213,6 +244,7 @@ impl Screen<WIDTH> for Fine<'_> {
 }
 
 /// In single precision, moved and scaled to the unit cube: the fourth number is the reach.
+#[derive(Default)]
 pub(super) struct Coarse {
     pub x0: Vec<[f32; 4]>,
     x1: Vec<[f32; 4]>,
@@ -223,7 +255,7 @@ pub(super) struct Coarse {
 
 impl Coarse {
     /// A reach that is missing is zero.
-    pub fn new(x0: &[Vec3], x1: Option<&[Vec3]>, reach: &[f64], par: Par) -> Coarse {
+    pub fn assign(&mut self, x0: &[Vec3], x1: Option<&[Vec3]>, reach: &[f64], par: Par) {
         let x1 = x1.unwrap_or(&[]);
         let mut bounds = Aabb::EMPTY;
         let of_part = |x: &[Vec3]| x.iter().fold(Aabb::EMPTY, |b, x| b.union(&Aabb { low: *x, high: *x }));
@@ -233,14 +265,15 @@ impl Coarse {
         let (low, size) = (bounds.low, sub(bounds.high, bounds.low));
         let largest = size[0].max(size[1]).max(size[2]);
         let per_metre = if (1e-50..1e60).contains(&largest) { 1.0 / largest } else { 0.0 };
-        let packed = |x: &[Vec3]| -> Vec<[f32; 4]> {
-            par.map_indexed(x.len(), |v| {
+        for (x, packed) in [(x0, &mut self.x0), (x1, &mut self.x1)] {
+            packed.resize(x.len(), [0.0; 4]);
+            par.map_into(packed, |v| {
                 let [a, b, c] = scale(per_metre, sub(x[v], low));
                 // Rounding is within the slack of the tests.
                 [a as f32, b as f32, c as f32, (per_metre * reach.get(v).copied().unwrap_or(0.0)) as f32]
-            })
-        };
-        Coarse { x0: packed(x0), x1: packed(x1), per_metre }
+            });
+        }
+        self.per_metre = per_metre;
     }
 }
 

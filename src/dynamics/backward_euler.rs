@@ -6,7 +6,7 @@ use crate::energy::Pattern;
 use crate::kinematics::world_inertia;
 use crate::linalg::{BlockMatrix, EnvelopeCholesky, GradientEnding, MixedGradient};
 use crate::math::{Vec3, add, add_scaled, lerp, mat_vec, scale, sub};
-use crate::model::{Drives, Dynamics, Kind, Model, Segment, System};
+use crate::model::{ByBody, Drives, Dynamics, Kind, Model, Segment, System, write_by_body};
 use crate::parallel::Par;
 
 /// Residual of the unconstrained solve, relative to that of standing at the old velocity, in the norm of the inverse
@@ -24,7 +24,7 @@ const DIRECT_STEPS: usize = 40;
 const DIRECT_WORK: usize = 20_000_000;
 
 /// Accelerations beyond gravity that an unconstrained solve found, by body key: where the next one starts.
-pub type Accelerations = Vec<(u64, Vec<Vec3>)>;
+pub type Accelerations = ByBody;
 
 /// What a segment of a step is driven with once the library has driven its own bodies; reused from step to step.
 #[derive(Clone, Debug, Default)]
@@ -101,21 +101,14 @@ impl Unconstrained {
 
     /// Writes the accelerations beyond gravity of the bodies that took iterations over the segment last solved.
     pub fn keep_accelerations(&self, segment: &Segment, out: &mut Accelerations) {
-        let mut kept = 0;
-        for work in self.works.iter().filter(|work| work.iterated) {
+        let of_works = self.works.iter().filter(|work| work.iterated).map(|work| {
             let body = &segment.model.bodies[work.body];
-            if out.len() == kept {
-                out.push((0, Vec::new()));
-            }
             let old = &segment.start.velocities[body.blocks.clone()];
             let acceleration =
                 |(v, u): (&Vec3, &Vec3)| sub(scale(1.0 / segment.dt, sub(*v, *u)), segment.drives.gravity);
-            out[kept].0 = body.description.key;
-            out[kept].1.clear();
-            out[kept].1.extend(work.velocities.iter().zip(old).map(acceleration));
-            kept += 1;
-        }
-        out.truncate(kept);
+            (body.description.key, work.velocities.iter().zip(old).map(acceleration))
+        });
+        write_by_body(out, of_works);
     }
 }
 

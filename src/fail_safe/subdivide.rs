@@ -26,8 +26,16 @@ impl Part {
     }
 }
 
-/// The parts of a step, last one first: as many as keep every rigid or scripted turn within `settings.turn_max`.
-pub fn parts_of_step(model: &Model, state: &State, drives: &Drives, settings: &Settings, dt: f64) -> Vec<Part> {
+/// The parts of a step, last one first: as many as keep every rigid or scripted turn within `settings.turn_max`. `parts`
+/// is written over.
+pub fn parts_of_step(
+    model: &Model,
+    state: &State,
+    drives: &Drives,
+    settings: &Settings,
+    dt: f64,
+    parts: &mut Vec<Part>,
+) {
     let mut largest = 0.0_f64;
     for (index, body) in model.bodies.iter().enumerate() {
         let angle = match body.description.kind {
@@ -46,7 +54,8 @@ pub fn parts_of_step(model: &Model, state: &State, drives: &Drives, settings: &S
     let wanted = (largest / settings.turn_max).ceil();
     let count = if wanted >= f64::from(PARTS_MAX) { PARTS_MAX } else { (wanted as u32).max(1) };
     let fraction = |i: u32| f64::from(i) / f64::from(count);
-    (0..count).rev().map(|i| Part { from: fraction(i), to: fraction(i + 1), depth: 0 }).collect()
+    parts.clear();
+    parts.extend((0..count).rev().map(|i| Part { from: fraction(i), to: fraction(i + 1), depth: 0 }));
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
 //! Continuous detection as a fail-safe sees it: velocities in, hits out.
 
 use crate::contact_search::{
-    BodyFilter, CandidateSearch, Contact, Hit, Passing, near_contacts, renewed_hits, swept_hits,
+    BodyFilter, CandidateSearch, Contact, Found, Hit, Passing, near_contacts, renewed_hits, swept_hits,
 };
-use crate::detection::Candidates;
 use crate::math::Vec3;
 use crate::model::{Segment, State};
 use crate::parallel::Par;
@@ -52,12 +51,13 @@ impl Sweep<'_> {
     }
 
     /// Contacts that are closer than `factor` times their thickness at the start, as [`near_contacts`].
-    pub fn near(&self, end: &State, factor: f64, candidates: &mut CandidateSearch) -> Vec<Contact> {
+    pub fn near(&self, end: &State, factor: f64, candidates: &mut CandidateSearch, out: &mut Vec<Contact>) {
+        let Segment { model, start, .. } = self.segment;
         let found = self.candidates(end, candidates);
-        near_contacts(self.segment.model, self.filter, self.passing, found, self.segment.start, end, factor, self.par)
+        near_contacts(model, self.filter, self.passing, found, start, end, factor, out, self.par);
     }
 
-    fn candidates<'a>(&self, end: &State, candidates: &'a mut CandidateSearch) -> &'a Candidates {
+    fn candidates<'a>(&self, end: &State, candidates: &'a mut CandidateSearch) -> Found<'a> {
         let Segment { model, start, .. } = self.segment;
         candidates.update(model, self.filter, &start.positions, &end.positions, self.factor, self.par)
     }

@@ -95,11 +95,9 @@ pub fn resolve_zones(
             break;
         }
         if round == 1 && response.fail_safe == FailSafe::UnilateralProjection {
-            zones.near = sweep
-                .near(&outcome.end, 1.0, candidates)
-                .into_iter()
-                .map(|contact| Near::new(contact, &nodes))
-                .collect();
+            let mut near = Vec::new();
+            sweep.near(&outcome.end, 1.0, candidates, &mut near);
+            zones.near = near.into_iter().map(|contact| Near::new(contact, &nodes)).collect();
         }
         zones.take_near();
         let touched = zones.touched(&outcome.hits, &nodes);

@@ -82,9 +82,8 @@ impl Sums {
 }
 
 /// Step size and momentum.
-pub(super) struct Momentum<'a> {
-    /// Whether block row i has off-diagonal blocks; the others keep scale 1, where relaxation is exact.
-    pub coupled: &'a [bool],
+#[derive(Default)]
+pub(super) struct Momentum {
     /// Scale of S on coupled blocks.
     pub metric_scale: f64,
     /// The scale before the last product, over the scale now.
@@ -92,16 +91,16 @@ pub(super) struct Momentum<'a> {
     t: f64,
 }
 
-impl<'a> Momentum<'a> {
+impl Momentum {
     /// No momentum yet.
-    pub fn new(coupled: &'a [bool], metric_scale: f64) -> Momentum<'a> {
-        Momentum { coupled, metric_scale, change: 1.0, t: 1.0 }
+    pub fn new(metric_scale: f64) -> Momentum {
+        Momentum { metric_scale, change: 1.0, t: 1.0 }
     }
 
-    /// Scale of S on block `b`.
+    /// Scale of S on a block: blocks that are not coupled keep 1, where relaxation is exact.
     #[inline]
-    pub fn block_scale(&self, b: usize) -> f64 {
-        if self.coupled[b] { self.metric_scale } else { 1.0 }
+    pub fn block_scale(&self, coupled: bool) -> f64 {
+        if coupled { self.metric_scale } else { 1.0 }
     }
 
     /// Judges an iteration by its sums; returns whether the scale grew.
@@ -163,45 +162,51 @@ impl PassSchedule {
     }
 }
 
+/// What runs keep their capacity in.
+#[derive(Default)]
+pub(super) struct RelaxationBuffers {
+    single: SingleRelaxation,
+    double: DoubleRelaxation,
+    now: Iterate,
+}
+
 /// Iterations in either precision.
-enum Engine<'a, 'b> {
-    Single(Box<SingleRelaxation<'a, 'b>>),
-    Double(Box<DoubleRelaxation<'a, 'b>>),
+enum Engine<'a> {
+    Single(&'a mut SingleRelaxation),
+    Double(&'a mut DoubleRelaxation),
 }
 
 /// Runs from `at` until the tolerances are met or `control` ends it; leaves the best iterate.
 pub(super) fn run(
     task: &Task,
-    coupled: &[bool],
     at: &mut Iterate,
     control: Control,
+    relaxation: &mut RelaxationBuffers,
     buffers: &mut MeasureBuffers,
     work: &mut Work,
 ) -> Run {
+    let RelaxationBuffers { single, double, now } = relaxation;
     let tolerance = task.settings.contact_tolerance.min(task.settings.velocity_tolerance);
-    let double = |at: &Iterate, scale| Engine::Double(Box::new(DoubleRelaxation::new(task, coupled, at, scale)));
     let mut engine = if tolerance >= SINGLE_FROM {
         // What conflicts with whole bodies that give way is tried without in the next turn.
-        let level = control.passes == Passes::One;
-        Engine::Single(Box::new(SingleRelaxation::new(task, coupled, at, FIRST_SCALE, level)))
+        Engine::single(single, task, at, control.passes == Passes::One)
     } else {
-        double(at, FIRST_SCALE)
+        Engine::double(double, task, at, FIRST_SCALE)
     };
     let mut test = StopTest::new();
     let mut schedule = PassSchedule::new(task.problem, control.passes);
     let mut stagnation = Stagnation::new(control.patience);
-    let mut now = Iterate::default();
     let mut far = false;
     let mut k = 0;
     while k < control.iterations_max {
         let every = if far { MEASURE_EVERY_FAR } else { MEASURE_EVERY };
         let steps = every.min(control.iterations_max - k);
-        engine.advance(steps, schedule.passes());
+        engine.advance(task, steps, schedule.passes());
         k += steps;
-        let residuals = engine.measure(&mut now, buffers);
+        let residuals = engine.measure(task, now, buffers);
         far = residuals.contact() > FAR * task.settings.contact_tolerance
             || residuals.dynamics > FAR * task.settings.velocity_tolerance;
-        match test.check(task, &now, &residuals, at, buffers, work) {
+        match test.check(task, now, &residuals, at, buffers, work) {
             Verdict::Converged(e) => {
                 engine.account(work);
                 return Run { iterations: k, ending: Ending::Converged, error: Some(e) };
@@ -212,7 +217,7 @@ pub(super) fn run(
                     return Run { iterations: k, ending: Ending::Stagnated, error: None };
                 }
                 // The range of single precision was too small for these masses.
-                engine = double(at, FIRST_SCALE);
+                engine = Engine::double(double, task, at, FIRST_SCALE);
                 continue;
             }
             Verdict::Continue => {}
@@ -228,37 +233,48 @@ pub(super) fn run(
         if stagnated && let Engine::Single(_) = &engine {
             // What is left may be rounding.
             engine.account(work);
-            engine = double(&now, engine.metric_scale());
+            let metric_scale = engine.metric_scale();
+            engine = Engine::double(double, task, now, metric_scale);
         } else if stagnated && residuals.merit() > HAND_OVER_ABOVE {
             engine.account(work);
             return Run { iterations: k, ending: Ending::Stagnated, error: None };
         } else {
-            engine.renew(&now, buffers);
+            engine.renew(task, now, buffers);
         }
     }
     engine.account(work);
     Run { iterations: k, ending: Ending::Exhausted, error: None }
 }
 
-impl Engine<'_, '_> {
-    fn advance(&mut self, iterations: u32, passes: u32) {
+impl<'a> Engine<'a> {
+    fn single(state: &'a mut SingleRelaxation, task: &Task, at: &Iterate, level: bool) -> Engine<'a> {
+        state.start(task, at, FIRST_SCALE, level);
+        Engine::Single(state)
+    }
+
+    fn double(state: &'a mut DoubleRelaxation, task: &Task, at: &Iterate, metric_scale: f64) -> Engine<'a> {
+        state.start(task, at, metric_scale);
+        Engine::Double(state)
+    }
+
+    fn advance(&mut self, task: &Task, iterations: u32, passes: u32) {
         match self {
-            Engine::Single(e) => e.advance(iterations, passes),
-            Engine::Double(e) => e.advance(iterations, passes),
+            Engine::Single(e) => e.advance(task, iterations, passes),
+            Engine::Double(e) => e.advance(task, iterations, passes),
         }
     }
 
-    fn measure(&mut self, now: &mut Iterate, buffers: &mut MeasureBuffers) -> Residuals {
+    fn measure(&mut self, task: &Task, now: &mut Iterate, buffers: &mut MeasureBuffers) -> Residuals {
         match self {
-            Engine::Single(e) => e.measure(now, buffers),
-            Engine::Double(e) => e.measure(now, buffers),
+            Engine::Single(e) => e.measure(task, now, buffers),
+            Engine::Double(e) => e.measure(task, now, buffers),
         }
     }
 
-    fn renew(&mut self, now: &Iterate, buffers: &MeasureBuffers) {
+    fn renew(&mut self, task: &Task, now: &Iterate, buffers: &MeasureBuffers) {
         match self {
-            Engine::Single(e) => e.renew(now, buffers),
-            Engine::Double(e) => e.renew(buffers),
+            Engine::Single(e) => e.renew(task, now, buffers),
+            Engine::Double(e) => e.renew(task, buffers),
         }
     }
 

@@ -1,7 +1,7 @@
 //! One step of implicit contact. Numbers of stages as in `docs/method/implicit.md`.
 
-use super::manifold_refinement::refine;
-use super::{Memory, SolverScratch};
+use super::Memory;
+use super::manifold_refinement::{RefinementBuffers, refine};
 use crate::contact_search::CandidateSearch;
 use crate::model::{Model, Settings, StepError, StepReport};
 use crate::step::{self, PartEnd, PartMethod, PartStart, Step, make_step};
@@ -9,8 +9,10 @@ use crate::step::{self, PartEnd, PartMethod, PartStart, Step, make_step};
 /// Buffers: capacity only, emptying it changes no bit.
 #[derive(Default)]
 pub struct Scratch {
-    /// Buffers of the contact solver.
-    pub solver: SolverScratch,
+    /// What a part starts from.
+    warm: Memory,
+    /// Buffers of the refinement.
+    refinement: RefinementBuffers,
     /// Those of the stages that every method shares.
     shared: step::Scratch,
 }
@@ -20,8 +22,9 @@ pub struct Scratch {
 /// On an error other than pinched state, memory and result are unchanged. Pinched leaves all three valid at the
 /// certified fraction of the step. Cost: per round linear in vertices, candidates and contacts, plus the broad phase.
 pub fn advance(mut step: Step, memory: &mut Memory, scratch: &mut Scratch) -> Result<StepReport, StepError> {
-    let Scratch { solver, shared } = scratch;
-    let mut refinement = Refinement { warm: memory.warm(), solver };
+    let Scratch { warm, refinement: buffers, shared } = scratch;
+    warm.warm_from(memory);
+    let mut refinement = Refinement { warm, buffers };
     let made = make_step(&mut refinement, &mut step, &mut memory.carried, shared)?;
     let account = &made.account;
     if account.last_dt > 0.0 {
@@ -33,8 +36,8 @@ pub fn advance(mut step: Step, memory: &mut Memory, scratch: &mut Scratch) -> Re
 
 /// Stages 4 to 6 over the parts of a step, each warm-started by the one before.
 struct Refinement<'a> {
-    warm: Memory,
-    solver: &'a mut SolverScratch,
+    warm: &'a mut Memory,
+    buffers: &'a mut RefinementBuffers,
 }
 
 impl PartMethod for Refinement<'_> {
@@ -43,8 +46,9 @@ impl PartMethod for Refinement<'_> {
         part: &PartStart,
         search: &mut CandidateSearch,
         report: &mut StepReport,
-    ) -> Result<PartEnd, StepError> {
-        refine(part, &self.warm, self.solver, search, report).map(|refined| refined.part_end())
+        end: &mut PartEnd,
+    ) -> Result<(), StepError> {
+        refine(part, self.warm, self.buffers, search, report, end)
     }
 
     fn halvings_max(&self, settings: &Settings) -> u32 {

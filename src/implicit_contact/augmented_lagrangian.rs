@@ -8,12 +8,11 @@
 use super::direct_newton::DirectNewton;
 use super::friction::{project, project_tangent};
 use super::newton_system::{Acting, NewtonSystem};
-use super::packed_contacts::{contact_velocity, relative_velocity, world_stiffness};
+use super::packed_contacts::{PackedContacts, contact_velocity, relative_velocity, world_stiffness};
 use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work, measure};
 use super::stop_test::{Ending, Run, Stagnation, StopTest, Verdict};
 use crate::math::{Mat3, Vec3, add_scaled, dot, mat_add, mat_scale, mat_vec, norm, sub};
 use crate::model::FrictionCone;
-use crate::parallel::BLOCK;
 
 /// Penalty stiffness relative to the effective mass of a contact.
 const STIFFNESS: f64 = 3.0;
@@ -124,8 +123,23 @@ impl Polish {
     }
 }
 
-struct Lagrangian<'a, 'b> {
-    task: &'b Task<'a>,
+/// The rows that a run takes.
+#[derive(Default)]
+struct Taken {
+    /// Whether each contact is, and whether it opens slower than it may.
+    flags: Vec<bool>,
+    opens_slower: Vec<bool>,
+    /// Those that are, as a problem of their own.
+    list: Vec<usize>,
+    packed: PackedContacts,
+    at: Iterate,
+}
+
+/// The state of a run; capacity is kept from run to run.
+#[derive(Default)]
+pub(super) struct Lagrangian {
+    taken: Taken,
+    now: Iterate,
     penalties: Vec<Penalty>,
     /// Normal velocity of each contact at the current `dv` `[m/s]`, and its change along the step.
     normals: Vec<f64>,
@@ -141,106 +155,24 @@ struct Lagrangian<'a, 'b> {
     /// `A dv` and `A step`.
     product: Vec<Vec3>,
     step_product: Vec<Vec3>,
-    /// Factors Newton systems; `None` where conjugate gradients are cheaper.
-    direct: Option<DirectNewton>,
+    /// Contacts that the slope along a step takes in, with their velocities and what the step adds to them.
+    sloping: Vec<usize>,
+    slopes: Vec<[Vec3; 2]>,
     work: Work,
 }
 
-/// Runs from `at` until the tolerances are met or the turn is over; leaves the best iterate. Iterations count the steps of
-/// the linear solves, which cost about as much as an iteration of the other solvers. Rows that open fast are left out
-/// until a solution violates them, and a run has converged only once it violates none.
-pub(super) fn run(
-    task: &Task,
-    direct: Option<DirectNewton>,
-    at: &mut Iterate,
-    turn: Turn,
-    buffers: &mut MeasureBuffers,
-    work: &mut Work,
-) -> Run {
-    if direct.is_some() {
-        return run_all(task, direct, at, turn, buffers, work);
-    }
-    let mut taken = vec![false; at.p.len()];
-    let mut last: Option<Run> = None;
-    loop {
-        let iterations = last.map_or(0, |run| run.iterations);
-        // The solution of the rows taken may violate others: then with those too, from there.
-        let share = if last.is_none() { NEAR } else { -task.settings.contact_tolerance };
-        let opens_slower = opening_slower_than(task, &at.dv, share * task.velocity_scale);
-        work.contacts += at.p.len() as u64;
-        let before = taken.iter().filter(|taken| **taken).count();
-        for (c, taken) in taken.iter_mut().enumerate() {
-            *taken |= at.p[c] != [0.0; 3] || opens_slower[c];
-        }
-        let list: Vec<usize> = (0..taken.len()).filter(|c| taken[*c]).collect();
-        if let Some(run) = last {
-            if list.len() == before {
-                return run;
-            }
-            if iterations >= turn.iterations_max {
-                return Run { ending: Ending::Exhausted, error: None, ..run };
-            }
-        }
-        let packed = task.packed.subset(task.problem, &list);
-        let part = Task { packed: &packed, ..*task };
-        let mut near = Iterate { dv: std::mem::take(&mut at.dv), p: list.iter().map(|c| at.p[*c]).collect() };
-        let left = Turn { iterations_max: turn.iterations_max - iterations, ..turn };
-        let run = run_all(&part, None, &mut near, left, buffers, work);
-        at.dv = near.dv;
-        for (c, p) in list.iter().zip(near.p) {
-            at.p[*c] = p;
-        }
-        let run = Run { iterations: iterations + run.iterations, ..run };
-        if run.ending != Ending::Converged {
-            return run;
-        }
-        last = Some(run);
-    }
-}
-
-/// Whether each contact opens slower than `limit` `[m/s]` at `dv`.
-fn opening_slower_than(task: &Task, dv: &[Vec3], limit: f64) -> Vec<bool> {
-    task.par.map_indexed(task.packed.contacts.len(), |c| {
+/// Puts whether each contact opens slower than `limit` `[m/s]` at `dv` into `out`.
+fn list_opening_slower_than(task: &Task, dv: &[Vec3], limit: f64, out: &mut Vec<bool>) {
+    task.par.map_indexed_into(out, task.packed.contacts.len(), |c| {
         let contact = &task.packed.contacts[c];
         dot(contact.frame[0], relative_velocity(contact, task.problem.rows, dv)) + contact.target[0] < limit
-    })
+    });
 }
 
-/// The same with all contacts of the task.
-fn run_all(
-    task: &Task,
-    direct: Option<DirectNewton>,
-    at: &mut Iterate,
-    turn: Turn,
-    buffers: &mut MeasureBuffers,
-    work: &mut Work,
-) -> Run {
-    let zeros = || vec![[0.0; 3]; at.dv.len()];
-    let contacts = at.p.len();
-    let relative = if direct.is_some() { STIFFNESS_FACTORED } else { STIFFNESS };
-    let mut l = Lagrangian {
-        task,
-        penalties: task.par.map_indexed(contacts, |c| penalty(relative, task.packed.natural_scale(c))),
-        normals: vec![0.0; contacts],
-        normal_steps: vec![0.0; contacts],
-        missed: vec![f64::INFINITY; contacts],
-        stiffened: vec![!turn.stiffens; contacts],
-        system: NewtonSystem::default(),
-        gradient: zeros(),
-        step: zeros(),
-        product: zeros(),
-        step_product: zeros(),
-        direct,
-        work: Work::default(),
-    };
-    let run = l.iterate(at, turn.iterations_max, Stagnation::new(turn.patience), buffers);
-    // Bounds were frozen: what is left of that, within the tolerances, goes.
-    for (p, contact) in at.p.iter_mut().zip(&task.packed.contacts) {
-        *p = project(task.settings.friction_cone, contact.friction, *p);
-    }
-    work.blocks += l.work.blocks;
-    work.contacts += l.work.contacts;
-    run
+/// `count` times `value`.
+fn fill<T: Copy>(buffer: &mut Vec<T>, count: usize, value: T) {
+    buffer.clear();
+    buffer.resize(count, value);
 }
 
 fn penalty(relative: f64, [normal, tangent]: [f64; 2]) -> Penalty {
@@ -248,59 +180,169 @@ fn penalty(relative: f64, [normal, tangent]: [f64; 2]) -> Penalty {
     Penalty { stiffness: [over(normal), over(tangent)], bound: 0.0 }
 }
 
-impl Lagrangian<'_, '_> {
+impl Lagrangian {
+    /// Runs from `at` until the tolerances are met or the turn is over; leaves the best iterate. Newton systems are factored
+    /// by `direct`, without it solved by conjugate gradients. Iterations count the steps of the linear solves, which cost
+    /// about as much as an iteration of the other solvers. Rows that open fast are left out until a solution violates them,
+    /// and a run has converged only once it violates none.
+    pub fn run(
+        &mut self,
+        task: &Task,
+        direct: Option<&mut DirectNewton>,
+        at: &mut Iterate,
+        turn: Turn,
+        buffers: &mut MeasureBuffers,
+        work: &mut Work,
+    ) -> Run {
+        if direct.is_some() {
+            return self.run_all(task, direct, at, turn, buffers, work);
+        }
+        let mut taken = std::mem::take(&mut self.taken);
+        let run = self.run_near(task, &mut taken, at, turn, buffers, work);
+        self.taken = taken;
+        run
+    }
+
+    /// Runs with the rows that are near alone, until they are all that count.
+    fn run_near(
+        &mut self,
+        task: &Task,
+        taken: &mut Taken,
+        at: &mut Iterate,
+        turn: Turn,
+        buffers: &mut MeasureBuffers,
+        work: &mut Work,
+    ) -> Run {
+        let Taken { flags, opens_slower, list, packed, at: near } = taken;
+        flags.clear();
+        flags.resize(at.p.len(), false);
+        let mut last: Option<Run> = None;
+        loop {
+            let iterations = last.map_or(0, |run| run.iterations);
+            // The solution of the rows taken may violate others: then with those too, from there.
+            let share = if last.is_none() { NEAR } else { -task.settings.contact_tolerance };
+            list_opening_slower_than(task, &at.dv, share * task.velocity_scale, opens_slower);
+            work.contacts += at.p.len() as u64;
+            let before = flags.iter().filter(|taken| **taken).count();
+            for (c, taken) in flags.iter_mut().enumerate() {
+                *taken |= at.p[c] != [0.0; 3] || opens_slower[c];
+            }
+            list.clear();
+            list.extend((0..flags.len()).filter(|c| flags[*c]));
+            if let Some(run) = last {
+                if list.len() == before {
+                    return run;
+                }
+                if iterations >= turn.iterations_max {
+                    return Run { ending: Ending::Exhausted, error: None, ..run };
+                }
+            }
+            packed.assign_subset(task.packed, task.problem, list);
+            let part = Task { packed, ..*task };
+            near.dv.clone_from(&at.dv);
+            near.p.clear();
+            near.p.extend(list.iter().map(|c| at.p[*c]));
+            let left = Turn { iterations_max: turn.iterations_max - iterations, ..turn };
+            let run = self.run_all(&part, None, near, left, buffers, work);
+            at.dv.copy_from_slice(&near.dv);
+            for (c, p) in list.iter().zip(&near.p) {
+                at.p[*c] = *p;
+            }
+            let run = Run { iterations: iterations + run.iterations, ..run };
+            if run.ending != Ending::Converged {
+                return run;
+            }
+            last = Some(run);
+        }
+    }
+
+    /// Runs with all contacts of the task.
+    fn run_all(
+        &mut self,
+        task: &Task,
+        direct: Option<&mut DirectNewton>,
+        at: &mut Iterate,
+        turn: Turn,
+        buffers: &mut MeasureBuffers,
+        work: &mut Work,
+    ) -> Run {
+        let (blocks, contacts) = (at.dv.len(), at.p.len());
+        let relative = if direct.is_some() { STIFFNESS_FACTORED } else { STIFFNESS };
+        let penalty = |c: usize| penalty(relative, task.packed.natural_scale(c));
+        task.par.map_indexed_into(&mut self.penalties, contacts, penalty);
+        fill(&mut self.normals, contacts, 0.0);
+        fill(&mut self.normal_steps, contacts, 0.0);
+        fill(&mut self.missed, contacts, f64::INFINITY);
+        fill(&mut self.stiffened, contacts, !turn.stiffens);
+        for buffer in [&mut self.gradient, &mut self.step, &mut self.product, &mut self.step_product] {
+            fill(buffer, blocks, [0.0; 3]);
+        }
+        self.now.clone_from(at);
+        self.work = Work::default();
+        let run = self.iterate(task, direct, at, turn, buffers);
+        // Bounds were frozen: what is left of that, within the tolerances, goes.
+        for (p, contact) in at.p.iter_mut().zip(&task.packed.contacts) {
+            *p = project(task.settings.friction_cone, contact.friction, *p);
+        }
+        work.blocks += self.work.blocks;
+        work.contacts += self.work.contacts;
+        run
+    }
+
     fn iterate(
         &mut self,
+        task: &Task,
+        mut direct: Option<&mut DirectNewton>,
         at: &mut Iterate,
-        iterations_max: u32,
-        mut stagnation: Stagnation<2>,
+        turn: Turn,
         buffers: &mut MeasureBuffers,
     ) -> Run {
-        let mut now = at.clone();
+        let iterations_max = turn.iterations_max;
+        let mut stagnation = Stagnation::new(turn.patience);
         let mut test = StopTest::new();
         let mut damping = Damping::default();
         let mut polish: Option<Polish> = None;
         let mut iterations = 0;
-        let factored = self.direct.is_some();
-        let tolerance = self.task.settings.contact_tolerance;
-        let exact = (FACTORED_SHARE * tolerance).max(ROUNDING) * self.task.velocity_scale;
+        let factored = direct.is_some();
+        let tolerance = task.settings.contact_tolerance;
+        let exact = (FACTORED_SHARE * tolerance).max(ROUNDING) * task.velocity_scale;
         // Further from a minimum, the velocities that follow from its impulses are far from those that led to them.
-        let settled = SETTLED * tolerance * self.task.velocity_scale;
-        self.start(&now);
+        let settled = SETTLED * tolerance * task.velocity_scale;
+        self.start(task);
         while iterations < iterations_max {
-            for (penalty, (contact, p)) in self.penalties.iter_mut().zip(self.task.packed.contacts.iter().zip(&now.p)) {
+            for (penalty, (contact, p)) in self.penalties.iter_mut().zip(task.packed.contacts.iter().zip(&self.now.p)) {
                 let bound = contact.friction * p[0];
                 let follows = iterations > 0 && *p != [0.0; 3];
                 penalty.bound = if follows { damping.follow(penalty.bound, bound) } else { bound };
             }
-            iterations += self.minimise(&mut now, iterations_max - iterations, exact);
-            while factored && self.gradient_velocity() > settled && iterations < iterations_max {
-                iterations += self.minimise(&mut now, iterations_max - iterations, exact);
+            iterations += self.minimise(task, direct.as_deref_mut(), iterations_max - iterations, exact);
+            while factored && self.gradient_velocity(task) > settled && iterations < iterations_max {
+                iterations += self.minimise(task, direct.as_deref_mut(), iterations_max - iterations, exact);
             }
-            now.p.fill([0.0; 3]);
+            self.now.p.fill([0.0; 3]);
             for acting in &self.system.acting {
-                now.p[acting.contact as usize] = acting.trial;
+                self.now.p[acting.contact as usize] = acting.trial;
             }
-            let residuals = measure(self.task, &now, buffers, &mut self.work);
+            let residuals = measure(task, &self.now, buffers, &mut self.work);
             self.product.copy_from_slice(&buffers.product);
             if let Some(polish) = &mut polish {
                 if !polish.improves(&residuals) {
                     break;
                 }
-                at.clone_from(&now);
+                at.clone_from(&self.now);
                 if polish.left == 0 || residuals.contact() <= POLISHED * tolerance {
                     break;
                 }
                 continue;
             }
             if !factored {
-                self.stiffen(&now.p);
+                self.stiffen(task);
             }
             damping.observe(residuals.merit());
-            if factored && self.gradient_velocity() > settled {
+            if factored && self.gradient_velocity(task) > settled {
                 break;
             }
-            match test.check(self.task, &now, &residuals, at, buffers, &mut self.work) {
+            match test.check(task, &self.now, &residuals, at, buffers, &mut self.work) {
                 Verdict::Converged(error) if factored => {
                     polish = Some(Polish { error, merit: residuals.merit(), left: POLISHES });
                 }
@@ -320,12 +362,12 @@ impl Lagrangian<'_, '_> {
 
     /// Stiffens the penalties of rows that the last update brought too little: rows that nearly depend on each other meet
     /// little compliance in their difference, of which an update takes away a small share.
-    fn stiffen(&mut self, p: &[Vec3]) {
-        let enough = self.task.settings.contact_tolerance * self.task.velocity_scale;
+    fn stiffen(&mut self, task: &Task) {
+        let enough = task.settings.contact_tolerance * task.velocity_scale;
         for acting in &self.system.acting {
             let c = acting.contact as usize;
             let stiffness = &mut self.penalties[c].stiffness[0];
-            let missed = self.normals[c].min(p[c][0] / *stiffness).abs();
+            let missed = self.normals[c].min(self.now.p[c][0] / *stiffness).abs();
             let before = std::mem::replace(&mut self.missed[c], missed);
             if missed > enough && missed > SLOW * before && !self.stiffened[c] {
                 self.stiffened[c] = true;
@@ -336,25 +378,26 @@ impl Lagrangian<'_, '_> {
 
     /// Newton steps over `dv` with the multipliers and bounds as they are; leaves the next multipliers in `trial`. Returns
     /// the steps of the linear solves.
-    fn minimise(&mut self, now: &mut Iterate, iterations_max: u32, exact: f64) -> u32 {
-        let factored = self.direct.is_some();
+    fn minimise(&mut self, task: &Task, mut direct: Option<&mut DirectNewton>, iterations_max: u32, exact: f64) -> u32 {
+        let factored = direct.is_some();
         let mut iterations = 0;
         for newton in 0..if factored { NEWTON_STEPS_FACTORED } else { NEWTON_STEPS } {
-            let change = self.evaluate(now);
+            let change = self.evaluate(task);
             let enough = if factored { exact } else { 2.0 * change };
-            if (newton > 0 && self.gradient_velocity() <= enough) || iterations >= iterations_max {
+            if (newton > 0 && self.gradient_velocity(task) <= enough) || iterations >= iterations_max {
                 return iterations;
             }
-            iterations += self.newton_step(iterations_max - iterations).max(1);
-            self.line_search(now);
+            iterations += self.newton_step(task, direct.as_deref_mut(), iterations_max - iterations).max(1);
+            self.line_search(task);
         }
-        self.evaluate(now);
+        self.evaluate(task);
         iterations
     }
 
     /// What follows `dv` from step to step, at a new one.
-    fn start(&mut self, now: &Iterate) {
-        let Task { problem, packed, par, .. } = *self.task;
+    fn start(&mut self, task: &Task) {
+        let Task { problem, packed, par, .. } = *task;
+        let now = &self.now;
         problem.matrix.product(&now.dv, &mut self.product, par);
         par.map_into(&mut self.normals, |c| {
             let contact = &packed.contacts[c];
@@ -362,12 +405,11 @@ impl Lagrangian<'_, '_> {
         });
     }
 
-    /// The contacts that act at `now`, their trial multipliers and stiffness, and the gradient; returns the largest change
+    /// The contacts that act now, their trial multipliers and stiffness, and the gradient; returns the largest change
     /// of a multiplier over its stiffness `[m/s]`.
-    fn evaluate(&mut self, now: &Iterate) -> f64 {
-        let Task { problem, packed, settings, par, .. } = *self.task;
-        let (penalties, normals) = (&self.penalties, &self.normals);
-        let count = now.p.len();
+    fn evaluate(&mut self, task: &Task) -> f64 {
+        let Task { problem, packed, settings, par, .. } = *task;
+        let (now, penalties, normals) = (&self.now, &self.penalties, &self.normals);
         let acts = |c: &usize| now.p[*c] != [0.0; 3] || penalties[*c].stiffness[0] * normals[*c] < 0.0;
         let of = |c: usize| {
             let (contact, penalty) = (&packed.contacts[c], &penalties[c]);
@@ -379,13 +421,9 @@ impl Lagrangian<'_, '_> {
                 stiffness: stiffness.map(|s| world_stiffness(&contact.frame, &s)),
             }
         };
-        let mut parts: Vec<(usize, Vec<Acting>)> = (0..count).step_by(BLOCK).map(|start| (start, Vec::new())).collect();
-        par.for_each_task(&mut parts, |(start, part)| {
-            part.extend((*start..count.min(*start + BLOCK)).filter(acts).map(of));
-        });
         self.system.acting.clear();
-        self.system.acting.extend(parts.into_iter().flat_map(|(_, part)| part));
-        self.system.index(self.task);
+        par.extend_filtered(&mut self.system.acting, now.p.len(), |c| acts(&c).then(|| of(c)));
+        self.system.index(task);
         let (incidence, impulses, product) = (&self.system.incidence, &self.system.impulses, &self.product);
         par.map_into(&mut self.gradient, |b| sub(product[b], incidence.gather(b, impulses)));
         self.work.contacts += 4 * self.system.acting.len() as u64;
@@ -399,15 +437,15 @@ impl Lagrangian<'_, '_> {
     }
 
     /// Largest `|D^-1 gradient|` `[m/s]`.
-    fn gradient_velocity(&self) -> f64 {
-        let inverse = self.task.problem.inverse_diagonal;
+    fn gradient_velocity(&self, task: &Task) -> f64 {
+        let inverse = task.problem.inverse_diagonal;
         self.gradient.iter().zip(inverse).map(|(g, m)| norm(mat_vec(m, *g))).fold(0.0, f64::max)
     }
 
     /// Solves for the Newton step; returns the steps of the linear solve.
-    fn newton_step(&mut self, steps_max: u32) -> u32 {
-        let Task { problem, packed, .. } = *self.task;
-        if let Some(direct) = &mut self.direct {
+    fn newton_step(&mut self, task: &Task, direct: Option<&mut DirectNewton>, steps_max: u32) -> u32 {
+        let Task { problem, packed, .. } = *task;
+        if let Some(direct) = direct {
             for (step, g) in self.step.iter_mut().zip(&self.gradient) {
                 *step = g.map(|x| -x);
             }
@@ -419,12 +457,12 @@ impl Lagrangian<'_, '_> {
             }
         }
         let control = (LINEAR_SOLVE.0, LINEAR_SOLVE.1.min(steps_max));
-        self.system.solve(self.task, &self.gradient, &mut self.step, control, &mut self.work)
+        self.system.solve(task, &self.gradient, &mut self.step, control, &mut self.work)
     }
 
     /// Moves `now.dv` along the step, all of it where that leaves a small slope.
-    fn line_search(&mut self, now: &mut Iterate) {
-        let Task { problem, packed, settings, par, .. } = *self.task;
+    fn line_search(&mut self, task: &Task) {
+        let Task { problem, packed, settings, par, .. } = *task;
         problem.matrix.product(&self.step, &mut self.step_product, par);
         let (step, product, step_product) = (&self.step, &self.product, &self.step_product);
         let n = step.len();
@@ -434,13 +472,15 @@ impl Lagrangian<'_, '_> {
             let contact = &packed.contacts[c];
             dot(contact.frame[0], relative_velocity(contact, problem.rows, step))
         });
-        let (p, penalties, normals, normal_steps) = (&now.p, &self.penalties, &self.normals, &self.normal_steps);
+        let Lagrangian { now, penalties, normals, normal_steps, sloping: list, slopes: seen, .. } = self;
+        let p = &now.p;
         // The trial of a contact without multiplier is zero all along where it is zero at both ends.
         let acts = |c: &usize| {
             p[*c] != [0.0; 3] || penalties[*c].stiffness[0] * normals[*c].min(normals[*c] + normal_steps[*c]) < 0.0
         };
-        let list: Vec<usize> = (0..p.len()).filter(acts).collect();
-        let seen: Vec<[Vec3; 2]> = par.map_indexed(list.len(), |k| {
+        list.clear();
+        list.extend((0..p.len()).filter(acts));
+        par.map_indexed_into(seen, list.len(), |k| {
             let contact = &packed.contacts[list[k]];
             let d = relative_velocity(contact, problem.rows, step);
             let f = &contact.frame;

@@ -19,7 +19,7 @@ const RESTING_SHARE: f64 = 1.1;
 const WELL_WITHIN: f64 = 1.0 - 1e-6;
 
 /// Contacts, the gaps they must keep, and what is known of their impulses.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct ConstraintSet {
     /// Contacts: first those near the start in pair order, then those found by continuous detection.
     pub contacts: Vec<Contact>,
@@ -43,23 +43,21 @@ pub struct Growth {
 }
 
 impl ConstraintSet {
-    /// The set of the contacts near the start, warm-started by key; those beyond their thickness are watched.
-    pub fn new(model: &Model, contacts: Vec<Contact>, memory: &Memory, settings: &Settings, dt: f64) -> ConstraintSet {
-        let mut set = ConstraintSet::default();
-        let resting = contacts.iter().filter(|c| c.start_gap < RESTING_SHARE * c.thickness).count();
-        set.required_gaps.reserve(resting);
-        set.kept_tangents.reserve(resting);
-        set.solved.reserve(resting);
-        set.contacts.reserve(resting);
-        set.watched.reserve(contacts.len() - resting);
-        for contact in contacts {
-            if contact.start_gap < RESTING_SHARE * contact.thickness {
-                set.push(model, contact, memory, settings, dt);
-            } else {
-                set.watched.push(contact);
-            }
-        }
-        set
+    /// Makes this the set of the contacts near the start, which are the ones `watched` now, warm-started by key; those
+    /// beyond their thickness stay watched.
+    pub fn begin(&mut self, model: &Model, memory: &Memory, settings: &Settings, dt: f64) {
+        let ConstraintSet { contacts, required_gaps, kept_tangents, solved, watched } = self;
+        let rests = |c: &Contact| c.start_gap < RESTING_SHARE * c.thickness;
+        let resting = watched.iter().filter(|c| rests(c)).count();
+        contacts.clear();
+        contacts.reserve(resting);
+        required_gaps.clear();
+        required_gaps.reserve(resting);
+        kept_tangents.clear();
+        kept_tangents.reserve(resting);
+        solved.clear();
+        solved.reserve(resting);
+        self.take(rests, model, memory, settings, dt);
     }
 
     /// Whether a watched contact is at less than `share` of its thickness at `end`.
@@ -80,15 +78,30 @@ impl ConstraintSet {
         settings: &Settings,
         dt: f64,
     ) -> usize {
-        let (near, far) =
-            std::mem::take(&mut self.watched).into_iter().partition(|c: &Contact| c.gap(end) < share * c.thickness);
-        self.watched = far;
-        let near: Vec<Contact> = near;
-        let count = near.len();
-        for contact in near {
-            self.push(model, contact, memory, settings, dt);
+        self.take(|c| c.gap(end) < share * c.thickness, model, memory, settings, dt)
+    }
+
+    /// Makes rows of the watched contacts that `which` names; how many.
+    fn take(
+        &mut self,
+        which: impl Fn(&Contact) -> bool,
+        model: &Model,
+        memory: &Memory,
+        settings: &Settings,
+        dt: f64,
+    ) -> usize {
+        let (all, mut left) = (self.watched.len(), 0);
+        for i in 0..all {
+            let contact = self.watched[i];
+            if which(&contact) {
+                self.push(model, contact, memory, settings, dt);
+            } else {
+                self.watched[left] = contact;
+                left += 1;
+            }
         }
-        count
+        self.watched.truncate(left);
+        all - left
     }
 
     /// Whether a row asks for more than its gap at the start.
@@ -159,13 +172,14 @@ impl ConstraintSet {
         growth
     }
 
-    /// Warm start of the rows, in their own frames.
-    pub fn row_impulses(&self, built: &BuiltRows) -> Vec<Vec3> {
+    /// Writes the warm start of the rows, in their own frames.
+    pub fn row_impulses(&self, built: &BuiltRows, out: &mut Vec<Vec3>) {
         let in_frame = |(row, contact): (usize, &u32)| {
             let f = self.solved[*contact as usize].impulse;
             built.rows.frames[row].map(|axis| dot(axis, f))
         };
-        built.contact.iter().enumerate().map(in_frame).collect()
+        out.clear();
+        out.extend(built.contact.iter().enumerate().map(in_frame));
     }
 
     /// Takes over the multipliers of a solve.

@@ -9,7 +9,8 @@ use crate::math::{IDENTITY, Mat3, Vec3, mat_add, mat_mul, mat_scale, skew, trans
 /// Block products of a factorisation beyond which conjugate gradients are cheaper: about ten milliseconds.
 const WORK_MAX: usize = 200_000;
 
-/// A system with its pattern, and the places of what contacts add to it.
+/// A system with its pattern, and the places of what contacts add to it; capacity is kept from problem to problem.
+#[derive(Default)]
 pub(super) struct DirectNewton {
     matrix: BlockMatrix,
     /// `A` in the pattern of `matrix`.
@@ -20,18 +21,24 @@ pub(super) struct DirectNewton {
     offsets: Vec<usize>,
     /// Block, and the map from its velocity to the relative velocity of the contact.
     entries: Vec<(u32, Mat3)>,
+    /// Pairs of blocks that are joined.
+    pairs: Vec<(u32, u32)>,
+    factor: EnvelopeCholesky,
+    eliminated: Vec<Vec3>,
 }
 
 impl DirectNewton {
-    /// The pattern over all contacts; `None` where a factor would cost more than it saves. Cost: a sort of the blocks that
-    /// contacts join.
-    pub fn new(problem: &ContactProblem) -> Option<DirectNewton> {
+    /// Takes the pattern over all contacts; `None` where a factor would cost more than it saves. Cost: a sort of the blocks
+    /// that contacts join.
+    pub fn assign(&mut self, problem: &ContactProblem) -> Option<&mut DirectNewton> {
+        let DirectNewton { matrix, bare, envelope, fixed, offsets, entries, pairs, .. } = self;
         let (a, rows) = (problem.matrix, problem.rows);
-        if Envelope::new(a).work() > WORK_MAX {
+        envelope.assign(a);
+        if envelope.work() > WORK_MAX {
             return None;
         }
-        let (offsets, entries) = entries_of(rows);
-        let mut pairs: Vec<(u32, u32)> = Vec::new();
+        list_entries(rows, offsets, entries);
+        pairs.clear();
         for row in 0..a.rows() {
             let columns = &a.columns[a.row_offsets[row]..a.row_offsets[row + 1]];
             pairs.extend(columns.iter().map(|column| (row as u32, *column)));
@@ -40,8 +47,8 @@ impl DirectNewton {
             let own = &entries[range[0]..range[1]];
             pairs.extend(own.iter().flat_map(|(b, _)| own.iter().map(move |(c, _)| (*b, *c))));
         }
-        let mut matrix = BlockMatrix::from_places(a.rows(), pairs);
-        let envelope = Envelope::new(&matrix);
+        matrix.assign_places(a.rows(), pairs);
+        envelope.assign(matrix);
         if envelope.work() > WORK_MAX {
             return None;
         }
@@ -51,8 +58,10 @@ impl DirectNewton {
                 matrix.values[place] = a.values[k];
             }
         }
-        let fixed = problem.inverse_diagonal.iter().map(|m| *m == [[0.0; 3]; 3]).collect();
-        Some(DirectNewton { bare: matrix.values.clone(), matrix, envelope, fixed, offsets, entries })
+        bare.clone_from(&matrix.values);
+        fixed.clear();
+        fixed.extend(problem.inverse_diagonal.iter().map(|m| *m == [[0.0; 3]; 3]));
+        Some(self)
     }
 
     /// Block products of a factorisation.
@@ -73,21 +82,24 @@ impl DirectNewton {
                 }
             }
         }
-        let Some(factor) = EnvelopeCholesky::new(&self.matrix, &self.envelope, &self.fixed) else { return false };
+        if !self.factor.assign(&self.matrix, &self.envelope, &self.fixed) {
+            return false;
+        }
         for (x, fixed) in x.iter_mut().zip(&self.fixed) {
             if *fixed {
                 *x = [0.0; 3];
             }
         }
-        factor.solve(&self.envelope, x, &mut Vec::new());
+        self.factor.solve(&self.envelope, x, &mut self.eliminated);
         true
     }
 }
 
-/// Entries of each row: `u = sum M_k v_k`.
-fn entries_of(rows: &RowSet) -> (Vec<usize>, Vec<(u32, Mat3)>) {
-    let mut offsets = vec![0];
-    let mut entries = Vec::new();
+/// Lists the entries of each row: `u = sum M_k v_k`.
+fn list_entries(rows: &RowSet, offsets: &mut Vec<usize>, entries: &mut Vec<(u32, Mat3)>) {
+    offsets.clear();
+    offsets.push(0);
+    entries.clear();
     for i in 0..rows.len() {
         for k in rows.offsets[i] as usize..rows.offsets[i + 1] as usize {
             entries.push((rows.blocks[k], mat_scale(rows.weights[k], &IDENTITY)));
@@ -98,7 +110,6 @@ fn entries_of(rows: &RowSet) -> (Vec<usize>, Vec<(u32, Mat3)>) {
         }
         offsets.push(entries.len());
     }
-    (offsets, entries)
 }
 
 #[cfg(test)]
@@ -143,7 +154,8 @@ mod tests {
             translations: None,
             velocity_scale: 1.0,
         };
-        let mut direct = DirectNewton::new(&problem).expect("a small system");
+        let mut direct = DirectNewton::default();
+        let direct = direct.assign(&problem).expect("a small system");
         let stiffness = [[[40.0, 3.0, 0.0], [3.0, 70.0, 5.0], [0.0, 5.0, 90.0]]; 3];
         // The second contact is open in the second solve: nothing of the first may be left.
         for open in [3, 1] {

@@ -21,10 +21,10 @@ struct Node {
     a_z: Vec3,
 }
 
-/// The state between two measurements.
-pub(super) struct DoubleRelaxation<'a, 'b> {
-    task: &'b Task<'a>,
-    momentum: Momentum<'b>,
+/// The state between two measurements; capacity is kept from run to run.
+#[derive(Default)]
+pub(super) struct DoubleRelaxation {
+    momentum: Momentum,
     /// `S^-1` by block, and the contacts' local metrics for it.
     inverse: Vec<Mat3>,
     metrics: Vec<LocalMetric>,
@@ -34,68 +34,64 @@ pub(super) struct DoubleRelaxation<'a, 'b> {
     /// `A dv'`
     a_u: Vec<Vec3>,
     p: Vec<Vec3>,
+    /// World impulses of the start.
+    impulses: Vec<Vec3>,
     pressing: Vec<u32>,
     iteration: u32,
     work: Work,
 }
 
-impl<'a, 'b> DoubleRelaxation<'a, 'b> {
+impl DoubleRelaxation {
     /// Starts from `at` with this scale of the metric: predicts from its own `C^T p`.
-    pub fn new(task: &'b Task<'a>, coupled: &'b [bool], at: &Iterate, metric_scale: f64) -> Self {
+    pub fn start(&mut self, task: &Task, at: &Iterate, metric_scale: f64) {
         let Task { problem, packed, par, .. } = *task;
-        let nodes = par.map_indexed(at.dv.len(), |b| {
+        let blocks = at.dv.len();
+        par.map_indexed_into(&mut self.nodes, blocks, |b| {
             let (dv, a_dv) = (at.dv[b], problem.matrix.row_product(b, &at.dv));
             Node { dv, a_dv, z: dv, a_z: a_dv }
         });
-        let mut r = DoubleRelaxation {
-            task,
-            momentum: Momentum::new(coupled, metric_scale),
-            inverse: Vec::new(),
-            metrics: Vec::new(),
-            nodes,
-            u: vec![[0.0; 3]; at.dv.len()],
-            a_u: vec![[0.0; 3]; at.dv.len()],
-            p: at.p.clone(),
-            pressing: Vec::new(),
-            iteration: 0,
-            work: Work { blocks: problem.matrix.values.len() as u64, contacts: at.p.len() as u64 },
-        };
-        r.set_scale();
-        let mut impulses = Vec::new();
-        packed.impulses(&r.p, &mut impulses, par);
-        let (nodes, inverse) = (&r.nodes, &r.inverse);
-        par.map_into(&mut r.u, |b| {
-            add(nodes[b].z, mat_vec(&inverse[b], sub(packed.incidence.gather(b, &impulses), nodes[b].a_z)))
+        self.momentum = Momentum::new(metric_scale);
+        self.a_u.clear();
+        self.a_u.resize(blocks, [0.0; 3]);
+        self.p.clone_from(&at.p);
+        self.pressing.clear();
+        self.iteration = 0;
+        self.work = Work { blocks: problem.matrix.values.len() as u64, contacts: at.p.len() as u64 };
+        self.set_scale(task);
+        packed.impulses(&self.p, &mut self.impulses, par);
+        let (nodes, inverse, impulses) = (&self.nodes, &self.inverse, &self.impulses);
+        par.map_indexed_into(&mut self.u, blocks, |b| {
+            add(nodes[b].z, mat_vec(&inverse[b], sub(packed.incidence.gather(b, impulses), nodes[b].a_z)))
         });
-        r
     }
 
-    fn set_scale(&mut self) {
-        let Task { problem, packed, par, .. } = *self.task;
+    fn set_scale(&mut self, task: &Task) {
+        let Task { problem, packed, par, .. } = *task;
         let (source, momentum) = (problem.inverse_diagonal, &self.momentum);
-        self.inverse = par.map_indexed(source.len(), |b| mat_scale(1.0 / momentum.block_scale(b), &source[b]));
-        self.metrics = packed.metrics(problem.rows, &self.inverse, par);
+        let scaled = |b: usize| mat_scale(1.0 / momentum.block_scale(task.coupled[b]), &source[b]);
+        par.map_indexed_into(&mut self.inverse, source.len(), scaled);
+        packed.metrics(problem.rows, &self.inverse, &mut self.metrics, par);
         self.work.contacts += self.metrics.len() as u64;
     }
 
     /// Makes iterations, the last one without extrapolation.
-    pub fn advance(&mut self, iterations: u32, passes: u32) {
+    pub fn advance(&mut self, task: &Task, iterations: u32, passes: u32) {
         for i in 1..=iterations {
-            self.relax(passes);
-            let sums = self.product();
+            self.relax(task, passes);
+            let sums = self.product(task);
             if self.momentum.observe(sums) {
-                self.set_scale();
+                self.set_scale(task);
             }
             self.iteration += 1;
             if i < iterations {
-                self.extrapolate(None);
+                self.extrapolate(task, None);
             }
         }
     }
 
     /// Relaxes the contacts: all of them now and then, else those that press.
-    fn relax(&mut self, passes: u32) {
-        let Task { problem, packed, settings, par, .. } = *self.task;
+    fn relax(&mut self, task: &Task, passes: u32) {
+        let Task { problem, packed, settings, par, .. } = *task;
         let (inverse, metrics) = (self.inverse.as_slice(), self.metrics.as_slice());
         let cx = PassContext { rows: problem.rows, inverse, metrics, cone: settings.friction_cone, repeats: 1, par };
         for pass in 0..passes {
@@ -111,8 +107,8 @@ impl<'a, 'b> DoubleRelaxation<'a, 'b> {
     }
 
     /// `A dv'` and the sums that steer step and momentum.
-    fn product(&mut self) -> Sums {
-        let Task { problem, par, .. } = *self.task;
+    fn product(&mut self, task: &Task) -> Sums {
+        let Task { problem, coupled, par, .. } = *task;
         let matrix = problem.matrix;
         let (u, nodes, momentum) = (&self.u, &self.nodes, &self.momentum);
         let block = |(block, out): (usize, &mut [Vec3])| {
@@ -122,7 +118,7 @@ impl<'a, 'b> DoubleRelaxation<'a, 'b> {
                 let node = &nodes[b];
                 *y = matrix.row_product(b, u);
                 let e = sub(u[b], node.z);
-                let se = scale(momentum.block_scale(b), mat_vec(matrix.diagonal_block(b), e));
+                let se = scale(momentum.block_scale(coupled[b]), mat_vec(matrix.diagonal_block(b), e));
                 sums.curvature += dot(e, sub(*y, node.a_z));
                 sums.metric += dot(e, se);
                 sums.turn -= dot(se, sub(u[b], node.dv));
@@ -136,21 +132,21 @@ impl<'a, 'b> DoubleRelaxation<'a, 'b> {
     }
 
     /// Puts the iterate into `now`, `A dv'` and `C^T p` into the buffers; returns the residuals.
-    pub fn measure(&mut self, now: &mut Iterate, buffers: &mut MeasureBuffers) -> Residuals {
+    pub fn measure(&mut self, task: &Task, now: &mut Iterate, buffers: &mut MeasureBuffers) -> Residuals {
         now.dv.clone_from(&self.u);
         now.p.clone_from(&self.p);
-        measure(self.task, now, buffers, &mut self.work)
+        measure(task, now, buffers, &mut self.work)
     }
 
     /// Continues from what was just measured.
-    pub fn renew(&mut self, buffers: &MeasureBuffers) {
-        self.extrapolate(Some(&buffers.contact));
+    pub fn renew(&mut self, task: &Task, buffers: &MeasureBuffers) {
+        self.extrapolate(task, Some(&buffers.contact));
     }
 
     /// The next prediction. `contact` is `C^T p` where that is known; else it follows from the prediction that was relaxed.
-    fn extrapolate(&mut self, contact: Option<&[Vec3]>) {
+    fn extrapolate(&mut self, task: &Task, contact: Option<&[Vec3]>) {
         let (beta, change) = self.momentum.next();
-        let (a_u, inverse, coupled) = (&self.a_u, &self.inverse, self.momentum.coupled);
+        let (a_u, inverse, coupled) = (&self.a_u, &self.inverse, task.coupled);
         let chunks = self.nodes.chunks_mut(BLOCK).zip(self.u.chunks_mut(BLOCK));
         let block = |(block, (nodes, u)): (usize, (&mut [Node], &mut [Vec3]))| {
             for (i, (node, u)) in nodes.iter_mut().zip(u.iter_mut()).enumerate() {
@@ -168,7 +164,7 @@ impl<'a, 'b> DoubleRelaxation<'a, 'b> {
                 *u = add(z, response);
             }
         };
-        self.task.par.fold_tasks(chunks.enumerate(), block, |()| {});
+        task.par.fold_tasks(chunks.enumerate(), block, |()| {});
     }
 
     /// Contacts that most passes relax.

@@ -41,7 +41,8 @@ pub(super) fn run(
     let mut test = StopTest::new();
     let mut predicted = vec![[0.0; 3]; at.dv.len()];
     let (mut before, mut paper) = (None, 0);
-    let metrics = task.packed.metrics(task.problem.rows, inverse, task.par);
+    let mut metrics = Vec::new();
+    task.packed.metrics(task.problem.rows, inverse, &mut metrics, task.par);
     measure(task, &now, buffers, work);
     for k in 1..=iterations_max {
         {

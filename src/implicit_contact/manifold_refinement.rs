@@ -2,12 +2,12 @@
 
 use super::constraint_set::ConstraintSet;
 use super::{ContactProblem, Memory, SolverReport, SolverScratch, solve};
-use crate::constraint::{BuiltRows, Linearisation, Metric, build_rows};
-use crate::contact_search::{CandidateSearch, Hit};
-use crate::math::{Vec3, add, mat_vec, norm, scale, sub};
+use crate::constraint::{BuiltRows, Linearisation, Metric, Reached};
+use crate::contact_search::{CandidateSearch, Contact, Hit};
+use crate::math::{Vec3, add, dot, mat_vec, norm, scale, sub};
 use crate::model::{Phase, Precision, Segment, Settings, State, StepError, StepReport};
 use crate::parallel::Par;
-use crate::step::{PartEnd, PartStart, SolvedContact, lap};
+use crate::step::{PartEnd, PartStart, Solved, SolvedContact, lap};
 use std::time::Instant;
 
 /// Factor of the tolerances when the solver missed a row that continuous detection then hit.
@@ -38,9 +38,33 @@ const LINEARISATION_SHARE: f64 = 0.02;
 /// A clean end that leaves a watched pair less than this share of its thickness is refined once more.
 const ADMITTED_SHARE: f64 = 0.98;
 
+/// Buffers of the refinement: capacity only, emptying them changes no bit.
+#[derive(Default)]
+pub(super) struct RefinementBuffers {
+    refined: Refined,
+    /// The tentative end, not rounded.
+    linear_end: State,
+    solve: SolveBuffers,
+}
+
+/// Buffers of a solve.
+#[derive(Default)]
+struct SolveBuffers {
+    solver: SolverScratch,
+    /// Translation per component.
+    shifts: Vec<Vec3>,
+    /// Multipliers of the rows.
+    impulses: Vec<Vec3>,
+    /// Response per block.
+    dv: Vec<Vec3>,
+    /// Warm impulse per block, and what it reaches.
+    remembered: Vec<Vec3>,
+    reached: Reached,
+}
+
 /// A tentative end of a segment, clean if `hits` is empty.
-#[derive(Clone, Default)]
-pub(super) struct Refined {
+#[derive(Default)]
+struct Refined {
     /// Velocity per block `[m/s]`.
     pub velocities: Vec<Vec3>,
     /// Contact impulse per block `[N s]`.
@@ -56,22 +80,32 @@ pub(super) struct Refined {
 }
 
 impl Refined {
-    /// The end that the refinement hands on.
-    pub fn part_end(self) -> PartEnd {
-        let set = self.set;
-        let mut is_row = vec![false; set.contacts.len()];
-        self.built.contact.iter().for_each(|contact| is_row[*contact as usize] = true);
-        let each = set.contacts.into_iter().zip(set.required_gaps).zip(set.solved).zip(is_row);
-        let contacts = each
-            .map(|(((contact, required_gap), solved), is_row)| SolvedContact { contact, required_gap, solved, is_row })
-            .collect();
-        PartEnd {
-            velocities: self.velocities,
-            block_impulses: self.block_impulses,
-            end: self.end,
-            contacts,
-            hits: self.hits,
-        }
+    /// Nothing done yet.
+    fn begin(&mut self, unconstrained: &[Vec3]) {
+        self.velocities.clear();
+        self.velocities.extend_from_slice(unconstrained);
+        self.block_impulses.clear();
+        self.hits.clear();
+    }
+
+    /// Writes the end that the refinement hands on.
+    fn write(&self, out: &mut PartEnd) {
+        let PartEnd { velocities, block_impulses, end, contacts, hits } = out;
+        velocities.clone_from(&self.velocities);
+        block_impulses.clone_from(&self.block_impulses);
+        end.clone_from(&self.end);
+        hits.clone_from(&self.hits);
+        let set = &self.set;
+        let each = set.contacts.iter().zip(&set.required_gaps).zip(&set.solved);
+        let solved = |((contact, required_gap), solved): ((&Contact, &f64), &Solved)| SolvedContact {
+            contact: *contact,
+            required_gap: *required_gap,
+            solved: *solved,
+            is_row: false,
+        };
+        contacts.clear();
+        contacts.extend(each.map(solved));
+        self.built.contact.iter().for_each(|contact| contacts[*contact as usize].is_row = true);
     }
 }
 
@@ -84,60 +118,70 @@ fn book(solve: &SolverReport, report: &mut StepReport) {
     report.dynamics_residual = report.dynamics_residual.max(solve.dynamics_residual);
 }
 
-/// Refines the constraint manifold until the tentative end is clean or the rounds are used up. Errors: cancelled.
+/// Refines the constraint manifold until the tentative end is clean or the rounds are used up, and writes it, or the last
+/// clean one. Errors: cancelled.
 pub(super) fn refine(
     part: &PartStart,
     memory: &Memory,
-    solver: &mut SolverScratch,
+    buffers: &mut RefinementBuffers,
     search: &mut CandidateSearch,
     report: &mut StepReport,
-) -> Result<Refined, StepError> {
+    out: &mut PartEnd,
+) -> Result<(), StepError> {
     let (sweep, segment) = (part.sweep(), &part.segment);
     let model = segment.model;
     let mut settings = *part.settings;
     let mut clock = Instant::now();
-    let mut refined = Refined { velocities: segment.drives.velocities.clone(), ..Refined::default() };
-    let mut linear_end = State::default();
-    segment.end_state(&refined.velocities, 1.0, false, &mut linear_end);
-    let near = if settings.ablation.near_contacts { sweep.near(&linear_end, sweep.factor, search) } else { Vec::new() };
-    refined.set = ConstraintSet::new(model, near, memory, &settings, segment.dt);
+    let RefinementBuffers { refined, linear_end, solve: solve_buffers } = buffers;
+    refined.begin(&segment.drives.velocities);
+    segment.end_state(&refined.velocities, 1.0, false, linear_end);
+    let near = &mut refined.set.watched;
+    near.clear();
+    if settings.ablation.near_contacts {
+        sweep.near(linear_end, sweep.factor, search, near);
+    }
+    refined.set.begin(model, memory, &settings, segment.dt);
     refined.set.admit(model, &linear_end.positions, 1.0, memory, &settings, segment.dt);
     report.times.search += lap(&mut clock);
     let scale_of_motion = fastest(&segment.start.positions, &linear_end.positions, segment.dt);
     let mut tolerance_factor = 1.0;
     let mut tightened = false;
-    let mut clean: Option<Refined> = None;
+    let mut was_clean = false;
     let mut rounds_left = settings.rounds_max.max(1);
     while rounds_left > 0 {
         part.watch.ask(Phase::Round, segment.from)?;
         rounds_left -= 1;
         report.rounds += 1;
         let converged =
-            solve_round(part, &linear_end, scale_of_motion, tolerance_factor, memory, &mut refined, solver, report);
+            solve_round(part, linear_end, scale_of_motion, tolerance_factor, memory, refined, solve_buffers, report);
         clock = Instant::now();
         segment.end_state(&refined.velocities, 1.0, true, &mut refined.end);
         refined.hits = sweep.hits(&refined.end, search);
         report.times.detection += lap(&mut clock);
-        unrounded_end(segment, &refined, &mut linear_end);
+        unrounded_end(segment, refined, linear_end);
         let end = &linear_end.positions;
         if !converged && refined.set.recovers() {
             // Nothing but recovery can ask for what has no solution: it is the first thing to go. What is left is
             // solved once at least, in a round more than the cap if need be.
             rounds_left = rounds_left.max(1);
             settings.recovery_fraction = 0.0;
-            clean = refined.hits.is_empty().then(|| refined.clone()).or(clean);
+            if refined.hits.is_empty() {
+                refined.write(out);
+                was_clean = true;
+            }
             refined.set.drop_recovery();
             refined.velocities.clone_from(&segment.drives.velocities);
             refined.block_impulses.clear();
-            segment.end_state(&refined.velocities, 1.0, false, &mut linear_end);
+            segment.end_state(&refined.velocities, 1.0, false, linear_end);
             continue;
         }
         if refined.hits.is_empty() {
-            let settled = worst_linearisation(segment, &refined, &linear_end) <= LINEARISATION_SHARE;
+            refined.write(out);
+            was_clean = true;
+            let settled = worst_linearisation(segment, refined, linear_end) <= LINEARISATION_SHARE;
             if settled && !refined.set.would_admit(end, ADMITTED_SHARE) {
-                return Ok(refined);
+                return Ok(());
             }
-            clean = Some(refined.clone());
             refined.set.admit(model, end, ADMITTED_SHARE, memory, &settings, segment.dt);
             continue;
         }
@@ -149,7 +193,10 @@ pub(super) fn refine(
         }
         tightened = growth.missed > 0;
     }
-    Ok(clean.unwrap_or(refined))
+    if !was_clean {
+        refined.write(out);
+    }
+    Ok(())
 }
 
 /// Steps 4.1 and 4.2: rows about the last tentative motion, constrained dynamics, new velocities; whether the solver
@@ -161,7 +208,7 @@ fn solve_round(
     tolerance_factor: f64,
     memory: &Memory,
     refined: &mut Refined,
-    solver: &mut SolverScratch,
+    buffers: &mut SolveBuffers,
     step_report: &mut StepReport,
 ) -> bool {
     let mut clock = Instant::now();
@@ -174,22 +221,25 @@ fn solve_round(
         unconstrained,
         dt: segment.dt,
     };
-    let set = &mut refined.set;
-    let built = build_rows(model, metric, &set.contacts, &set.required_gaps, &set.kept_tangents, &about);
+    let SolveBuffers { solver, shifts, impulses, dv, remembered, reached } = buffers;
+    let Refined { set, built, .. } = refined;
+    built.assign(model, metric, &set.contacts, &set.required_gaps, &set.kept_tangents, &about);
     step_report.times.rows += lap(&mut clock);
     if built.rows.is_empty() {
         refined.velocities.clone_from(unconstrained);
-        refined.block_impulses = vec![[0.0; 3]; model.block_count];
-        refined.built = built;
+        refined.block_impulses.clear();
+        refined.block_impulses.resize(model.block_count, [0.0; 3]);
         return true;
     }
-    let mut impulses = set.row_impulses(&built);
-    let first = refined.block_impulses.is_empty();
-    let mut dv = if first {
-        remembered_response(segment, metric, memory, &built, &impulses)
+    set.row_impulses(built, impulses);
+    dv.clear();
+    if refined.block_impulses.is_empty() {
+        block_impulses(model.block_count, built, impulses, remembered);
+        metric.reached(remembered, reached);
+        remembered_response(segment, &reached.blocks, memory, dv);
     } else {
-        refined.velocities.iter().zip(unconstrained).map(|(v, u)| sub(*v, *u)).collect()
-    };
+        dv.extend(refined.velocities.iter().zip(unconstrained).map(|(v, u)| sub(*v, *u)));
+    }
     let demanded = built.rows.normal_targets.iter().fold(0.0_f64, |a, c| a.max(*c));
     let velocity_scale = scale_of_motion.max(demanded);
     let settings = Settings {
@@ -204,7 +254,7 @@ fn solve_round(
         velocity_scale,
     };
     let report = if velocity_scale > 0.0 {
-        solve_balanced(&problem, metric, &mut impulses, &mut dv, &settings, solver, part.par)
+        solve_balanced(&problem, metric, impulses, dv, &settings, (solver, shifts), part.par)
     } else {
         // Nothing moves and no row asks for anything.
         impulses.fill([0.0; 3]);
@@ -212,9 +262,8 @@ fn solve_round(
         SolverReport { converged: true, ..SolverReport::default() }
     };
     book(&report, step_report);
-    set.keep(part.settings.friction_cone, &built, &impulses);
-    refined.block_impulses = block_impulses(model.block_count, &built, &impulses);
-    refined.built = built;
+    set.keep(part.settings.friction_cone, built, impulses);
+    block_impulses(model.block_count, built, impulses, &mut refined.block_impulses);
     for block in 0..model.block_count {
         // Where masses are lumped the response is the impulse over the mass, to rounding, whatever the iterations.
         let response = if metric.uncoupled[block] {
@@ -252,7 +301,7 @@ fn solve_balanced(
     impulses: &mut [Vec3],
     dv: &mut [Vec3],
     settings: &Settings,
-    scratch: &mut SolverScratch,
+    (scratch, shifts): (&mut SolverScratch, &mut Vec<Vec3>),
     par: Par,
 ) -> SolverReport {
     let mut settings = *settings;
@@ -260,7 +309,8 @@ fn solve_balanced(
     for _ in 0..BALANCES_MAX {
         let report = solve(problem, impulses, dv, &settings, scratch, par);
         let (product, given) = scratch.balance();
-        let moved = metric.translations.translate(&metric.translations.missing(given, product), dv);
+        metric.translations.missing_into(given, product, shifts);
+        let moved = metric.translations.translate(shifts, dv);
         // A row weighs both its sides with one at most.
         let off = 2.0 * moved / problem.velocity_scale;
         total = SolverReport {
@@ -278,25 +328,18 @@ fn solve_balanced(
 }
 
 /// `C^T p` per block.
-fn block_impulses(blocks: usize, built: &BuiltRows, impulses: &[Vec3]) -> Vec<Vec3> {
-    let mut out = vec![[0.0; 3]; blocks];
+fn block_impulses(blocks: usize, built: &BuiltRows, impulses: &[Vec3], out: &mut Vec<Vec3>) {
+    out.clear();
+    out.resize(blocks, [0.0; 3]);
     for (row, p) in impulses.iter().enumerate() {
-        built.rows.scatter(row, built.rows.impulse(row, *p), &mut out);
+        built.rows.scatter(row, built.rows.impulse(row, *p), out);
     }
-    out
 }
 
 /// Warm start of the response: last velocity minus v*, on blocks that a warm impulse reaches; zero elsewhere.
-fn remembered_response(
-    segment: &Segment,
-    metric: &Metric,
-    memory: &Memory,
-    built: &BuiltRows,
-    impulses: &[Vec3],
-) -> Vec<Vec3> {
-    let blocks = segment.model.block_count;
-    let mut dv = vec![[0.0; 3]; blocks];
-    let reached = metric.reached(&block_impulses(blocks, built, impulses));
+fn remembered_response(segment: &Segment, reached: &[bool], memory: &Memory, dv: &mut Vec<Vec3>) {
+    dv.clear();
+    dv.resize(segment.model.block_count, [0.0; 3]);
     for (key, velocities) in &memory.velocities {
         let Some(body) = segment.model.body_index(*key).map(|b| &segment.model.bodies[b]) else { continue };
         if body.blocks.len() != velocities.len() {
@@ -308,7 +351,6 @@ fn remembered_response(
             }
         }
     }
-    dv
 }
 
 /// The tentative end before rounding; the rounded one where no body is rounded.
@@ -324,8 +366,7 @@ fn unrounded_end(segment: &Segment, refined: &Refined, out: &mut State) {
 /// Largest difference between true and linear gap of rows that push, as a share of the required gap.
 fn worst_linearisation(segment: &Segment, refined: &Refined, end: &State) -> f64 {
     let rows = &refined.built.rows;
-    let response: Vec<Vec3> =
-        refined.velocities.iter().zip(&segment.drives.velocities).map(|(v, u)| sub(*v, *u)).collect();
+    let response = |block: usize| sub(refined.velocities[block], segment.drives.velocities[block]);
     let mut worst = 0.0_f64;
     for (row, contact) in refined.built.contact.iter().enumerate() {
         let index = *contact as usize;
@@ -334,7 +375,7 @@ fn worst_linearisation(segment: &Segment, refined: &Refined, end: &State) -> f64
             continue;
         }
         let required = refined.set.required_gaps[index];
-        let excess = rows.velocity(row, &response)[0] - rows.normal_targets[row];
+        let excess = dot(rows.frames[row][0], rows.relative_velocity_of(row, response)) - rows.normal_targets[row];
         let difference = refined.set.contacts[index].gap(&end.positions) - (required + segment.dt * excess);
         worst = worst.max(difference.abs() / required.abs().max(f64::MIN_POSITIVE));
     }

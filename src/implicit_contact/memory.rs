@@ -2,7 +2,7 @@
 
 use crate::contact_search::{Contact, ContactKey};
 use crate::math::{Vec3, norm, scale};
-use crate::model::Model;
+use crate::model::{Body, ByBody, Model, write_by_body};
 use crate::step::{Carried, SolvedContact};
 
 /// One contact of the last step.
@@ -24,7 +24,7 @@ pub struct Memory {
     /// Duration of the segment that they come from `[s]`.
     pub dt: f64,
     /// Velocities at the end of the last step, by body key.
-    pub velocities: Vec<(u64, Vec<Vec3>)>,
+    pub velocities: ByBody,
     /// What every method carries.
     pub carried: Carried,
 }
@@ -47,6 +47,7 @@ impl Memory {
     pub fn keep_contacts(&mut self, model: &Model, contacts: &[SolvedContact], dt: f64) {
         self.dt = dt;
         self.contacts.clear();
+        self.contacts.reserve_exact(contacts.iter().filter(|c| norm(c.solved.impulse) > 0.0).count());
         for SolvedContact { contact, solved, .. } in contacts {
             if norm(solved.impulse) > 0.0 {
                 self.contacts.push(RememberedContact {
@@ -61,16 +62,15 @@ impl Memory {
 
     /// Remembers velocities per block, by body.
     pub fn keep_velocities(&mut self, model: &Model, velocities: &[Vec3]) {
-        self.velocities.clear();
-        for body in model.bodies.iter().filter(|b| !b.blocks.is_empty()) {
-            self.velocities.push((body.description.key, velocities[body.blocks.clone()].to_vec()));
-        }
+        let of_body = |b: &Body| (b.description.key, velocities[b.blocks.clone()].iter().copied());
+        write_by_body(&mut self.velocities, model.bodies.iter().filter(|b| !b.blocks.is_empty()).map(of_body));
     }
 
-    /// What the first part of a step starts from.
-    pub fn warm(&self) -> Memory {
-        let (contacts, velocities) = (self.contacts.clone(), self.velocities.clone());
-        Memory { contacts, dt: self.dt, velocities, ..Memory::default() }
+    /// Takes over what the first part of a step starts from.
+    pub fn warm_from(&mut self, last: &Memory) {
+        self.contacts.clone_from(&last.contacts);
+        self.dt = last.dt;
+        write_by_body(&mut self.velocities, last.velocities.iter().map(|(key, list)| (*key, list.iter().copied())));
     }
 
     /// Bytes held.

@@ -5,7 +5,7 @@ use super::friction::{LocalMetric, local_step, project_tangent};
 use super::incidence::Incidence;
 use super::problem::ContactProblem;
 use crate::constraint::RowSet;
-use crate::linalg::{Colouring, colour};
+use crate::linalg::Colouring;
 use crate::math::{Mat3, Vec3, add, add_scaled, cross, dot, mat_transpose_vec, mat_vec, scale};
 use crate::model::FrictionCone;
 use crate::parallel::{BLOCK, Par};
@@ -34,13 +34,13 @@ pub(super) struct Contact {
     pub general: bool,
 }
 
-/// Contacts in sweep order.
+/// Contacts in sweep order; capacity is kept from problem to problem.
 #[derive(Default)]
 pub(super) struct PackedContacts {
     /// Records.
     pub contacts: Vec<Contact>,
     /// Groups of records that share no block; the last one is swept in order.
-    pub groups: Vec<usize>,
+    colouring: Colouring,
     /// The contacts of each block.
     pub incidence: Incidence,
     /// Scales of their natural maps.
@@ -102,7 +102,7 @@ fn respond(contact: &Contact, rows: &RowSet, inverse: &[Mat3], f: Vec3, u: &mut 
 }
 
 /// `W S^-1 W^T` of one contact, world frame.
-fn world_metric(rows: &RowSet, contact: &Contact, inverse: &[Mat3]) -> Mat3 {
+fn world_metric(contact: &Contact, rows: &RowSet, inverse: &[Mat3]) -> Mat3 {
     let mut g = [[0.0; 3]; 3];
     if !contact.general {
         for (b, w) in contact.blocks.iter().zip(contact.weights) {
@@ -149,45 +149,43 @@ fn frame_metric(frame: &[Vec3; 3], g: &Mat3) -> [f64; 6] {
     [entries[0].max(0.0), entries[1], entries[2], entries[3].max(0.0), entries[4], entries[5].max(0.0)]
 }
 
+/// Local metric of one contact for the block-diagonal metric with this inverse.
+fn local_metric(contact: &Contact, rows: &RowSet, inverse: &[Mat3]) -> LocalMetric {
+    LocalMetric::new(frame_metric(&contact.frame, &world_metric(contact, rows, inverse)))
+}
+
 impl PackedContacts {
     /// Packs the rows of `problem`. Cost: one pass over the entries.
-    pub fn new(problem: &ContactProblem, par: Par) -> PackedContacts {
-        let rows = problem.rows;
-        let blocks = problem.inverse_diagonal.len();
-        let order = if rows.len() >= COLOURED_FROM {
-            colour(rows.len(), blocks, |i| entry_blocks(rows, i))
+    pub fn assign(&mut self, problem: &ContactProblem, par: Par) {
+        let PackedContacts { contacts, colouring, incidence, scales } = self;
+        let (rows, inverse) = (problem.rows, problem.inverse_diagonal);
+        if rows.len() >= COLOURED_FROM {
+            colouring.assign(rows.len(), inverse.len(), |i| entry_blocks(rows, i));
         } else {
-            Colouring { order: (0..rows.len() as u32).collect(), offsets: vec![0, rows.len()] }
-        };
-        let contacts = par.map_indexed(rows.len(), |k| pack(rows, order.order[k] as usize));
-        let mut incidence = Incidence::default();
-        incidence.rebuild(rows, blocks, contacts.iter().map(|c| c.source as usize));
-        let mut packed = PackedContacts { contacts, groups: order.offsets, incidence, scales: Vec::new() };
-        packed.scales = par.map_indexed(rows.len(), |c| {
-            let metric = packed.metric(c, rows, problem.inverse_diagonal);
+            colouring.assign_uncoloured(rows.len());
+        }
+        par.map_indexed_into(contacts, rows.len(), |k| pack(rows, colouring.order[k] as usize));
+        incidence.rebuild(rows, inverse.len(), contacts.iter().map(|c| c.source as usize));
+        par.map_indexed_into(scales, rows.len(), |c| {
+            let metric = local_metric(&contacts[c], rows, inverse);
             [metric.entries[0], if metric.tangent_step > 0.0 { 1.0 / metric.tangent_step } else { 0.0 }]
         });
-        packed
     }
 
-    /// The contacts `list` alone, in its order. Cost: a pass over their entries and over the blocks.
-    pub fn subset(&self, problem: &ContactProblem, list: &[usize]) -> PackedContacts {
-        let contacts: Vec<Contact> = list.iter().map(|c| self.contacts[*c]).collect();
-        let mut incidence = Incidence::default();
-        let sources = contacts.iter().map(|c| c.source as usize);
-        incidence.rebuild(problem.rows, problem.inverse_diagonal.len(), sources);
-        let scales = list.iter().map(|c| self.scales[*c]).collect();
-        PackedContacts { groups: vec![0, contacts.len()], contacts, incidence, scales }
-    }
-
-    /// Local metric of contact `c` for the block-diagonal metric with this inverse.
-    pub fn metric(&self, c: usize, rows: &RowSet, inverse: &[Mat3]) -> LocalMetric {
-        LocalMetric::new(self.in_frame(c, &self.world_metric(c, rows, inverse)))
+    /// Takes the contacts `list` of `whole` alone, in its order. Cost: a pass over their entries and over the blocks.
+    pub fn assign_subset(&mut self, whole: &PackedContacts, problem: &ContactProblem, list: &[usize]) {
+        let PackedContacts { contacts, colouring, incidence, scales } = self;
+        contacts.clear();
+        contacts.extend(list.iter().map(|c| whole.contacts[*c]));
+        colouring.assign_uncoloured(list.len());
+        incidence.rebuild(problem.rows, problem.inverse_diagonal.len(), contacts.iter().map(|c| c.source as usize));
+        scales.clear();
+        scales.extend(list.iter().map(|c| whole.scales[*c]));
     }
 
     /// `W S^-1 W^T` of contact `c`, world frame.
     pub fn world_metric(&self, c: usize, rows: &RowSet, inverse: &[Mat3]) -> Mat3 {
-        world_metric(rows, &self.contacts[c], inverse)
+        world_metric(&self.contacts[c], rows, inverse)
     }
 
     /// `R G R^T` of contact `c` for a symmetric G, as its upper triangle.
@@ -195,9 +193,9 @@ impl PackedContacts {
         frame_metric(&self.contacts[c].frame, g)
     }
 
-    /// Local metrics of all contacts.
-    pub fn metrics(&self, rows: &RowSet, inverse: &[Mat3], par: Par) -> Vec<LocalMetric> {
-        par.map_indexed(self.contacts.len(), |c| self.metric(c, rows, inverse))
+    /// Local metrics of all contacts for the block-diagonal metric with this inverse.
+    pub fn metrics(&self, rows: &RowSet, inverse: &[Mat3], out: &mut Vec<LocalMetric>, par: Par) {
+        par.map_indexed_into(out, self.contacts.len(), |c| local_metric(&self.contacts[c], rows, inverse));
     }
 
     /// Adds block by block `W^T R^T p` of the contacts `list` to `out`, in their order.
@@ -233,8 +231,9 @@ impl PackedContacts {
                 list.len() as u64
             }
             None => {
-                let remainder = self.groups[self.groups.len() - 2];
-                for g in self.groups.windows(2).take(self.groups.len() - 2) {
+                let groups = &self.colouring.offsets;
+                let remainder = groups[groups.len() - 2];
+                for g in groups.windows(2).take(groups.len() - 2) {
                     self.pass_group(cx, g[0]..g[1], p, u);
                 }
                 for c in remainder..self.contacts.len() {

@@ -1,8 +1,8 @@
 //! The frictional contact problem [Otaduy09, Eq. 7] over one metric, and the one signature of its solvers.
 
-use super::accelerated_relaxation::{Control, Passes};
-use super::augmented_lagrangian::Turn;
-use super::block_diagonal::Best;
+use super::accelerated_relaxation::{Control, Passes, RelaxationBuffers};
+use super::augmented_lagrangian::{Lagrangian, Turn};
+use super::block_diagonal::{Best, PassBuffers};
 use super::direct_newton::DirectNewton;
 use super::friction::project;
 use super::iterative_anticipation::{self, Inner};
@@ -10,7 +10,7 @@ use super::packed_contacts::PackedContacts;
 use super::residuals::{Iterate, MeasureBuffers, Task, Work, contact_residuals, measure};
 use super::stop_test::{Ending, Run};
 use super::velocity_error::velocity_error;
-use super::{accelerated_relaxation, augmented_lagrangian, block_diagonal, full_anticipation, splitting_start};
+use super::{accelerated_relaxation, block_diagonal, full_anticipation, splitting_start};
 use crate::constraint::{RowSet, Translations};
 use crate::linalg::{BlockMatrix, SinglePrecision};
 use crate::math::{Mat3, Vec3, is_finite, mat_vec};
@@ -66,13 +66,28 @@ pub struct SolverReport {
 /// Buffers of the solvers: capacity only, emptying it changes no bit.
 #[derive(Default)]
 pub struct SolverScratch {
+    packed: PackedContacts,
+    single: SinglePrecision,
+    coupled: Vec<bool>,
+    at: Iterate,
+    buffers: Buffers,
+}
+
+/// What the solvers keep their capacity in.
+#[derive(Default)]
+struct Buffers {
     measure: MeasureBuffers,
+    relaxation: RelaxationBuffers,
+    best: Best,
+    passes: PassBuffers,
+    direct: DirectNewton,
+    lagrangian: Lagrangian,
 }
 
 impl SolverScratch {
     /// `A dv` and `C^T p` of what the last solve returned.
     pub(super) fn balance(&self) -> (&[Vec3], &[Vec3]) {
-        (&self.measure.product, &self.measure.contact)
+        (&self.buffers.measure.product, &self.buffers.measure.contact)
     }
 }
 
@@ -82,6 +97,9 @@ impl SolverScratch {
 /// Always ends: at most `settings.iterations_max` outer iterations. Blocks without off-diagonal entries (lumped masses,
 /// rigid bodies) leave with `dv = D^-1 C^T p` to rounding, at any number of iterations: momentum is exact for them.
 /// Values that are not finite in the warm start are dropped; the result is finite.
+///
+/// Without a pool the choices `Automatic` (without a splitting start), `AcceleratedRelaxation` and `AugmentedLagrangian`
+/// allocate nothing once the buffers have their size.
 pub fn solve(
     problem: &ContactProblem,
     impulses: &mut [Vec3],
@@ -101,21 +119,24 @@ fn solve_here(
     scratch: &mut SolverScratch,
     par: Par,
 ) -> SolverReport {
-    let packed = PackedContacts::new(problem, par);
+    let SolverScratch { packed, single, coupled, at, buffers } = scratch;
+    packed.assign(problem, par);
     let velocity_scale = velocity_scale(problem);
-    let typical_mass = typical_mass(problem, &packed);
-    let single = SinglePrecision::new(problem.matrix);
+    let typical_mass = typical_mass(problem, packed);
+    single.assign(problem.matrix);
+    coupled.clear();
+    coupled.extend((0..dv.len()).map(|b| is_coupled(problem, b)));
     let task = Task {
         problem,
-        single: &single,
-        packed: &packed,
+        packed,
+        single,
+        coupled,
         settings,
         velocity_scale,
         impulse_floor: (IMPULSE_FLOOR * velocity_scale * typical_mass.sqrt()).max(f64::MIN_POSITIVE),
         par,
     };
-    let coupled: Vec<bool> = (0..dv.len()).map(|b| is_coupled(problem, b)).collect();
-    let mut at = warm_start(&task, impulses, dv);
+    warm_start(&task, impulses, dv, at);
     let mut work = Work::default();
     let mut report = SolverReport::default();
     let mut error = None;
@@ -123,9 +144,9 @@ fn solve_here(
         at.dv.fill([0.0; 3]);
         report.converged = true;
     } else {
-        error = choose(&task, &coupled, &mut at, &mut scratch.measure, &mut work, &mut report);
+        error = choose(&task, at, buffers, &mut work, &mut report);
     }
-    finish(&task, &coupled, &mut at, &mut scratch.measure, &mut work, error, &mut report);
+    finish(&task, at, &mut buffers.measure, &mut work, error, &mut report);
     for (c, contact) in packed.contacts.iter().enumerate() {
         impulses[contact.source as usize] = at.p[c];
     }
@@ -147,28 +168,25 @@ const UNCOUPLED_TURN: u32 = 32;
 /// Runs the solver that the settings name.
 fn choose(
     task: &Task,
-    coupled: &[bool],
     at: &mut Iterate,
-    buffers: &mut MeasureBuffers,
+    buffers: &mut Buffers,
     work: &mut Work,
     report: &mut SolverReport,
 ) -> Option<f64> {
     let max = task.settings.iterations_max;
     let run = match task.settings.solver {
-        SolverChoice::IterativeAnticipation => anticipate(task, Inner::Paper, at, buffers, work, report),
-        SolverChoice::LightAnticipation => anticipate(task, Inner::Light, at, buffers, work, report),
-        SolverChoice::AugmentedLagrangian => {
-            augmented_lagrangian::run(task, DirectNewton::new(task.problem), at, Turn::of(max), buffers, work)
-        }
-        SolverChoice::FullAnticipation => match full_anticipation::run(task, at, max, buffers, work) {
+        SolverChoice::IterativeAnticipation => anticipate(task, Inner::Paper, at, &mut buffers.measure, work, report),
+        SolverChoice::LightAnticipation => anticipate(task, Inner::Light, at, &mut buffers.measure, work, report),
+        SolverChoice::AugmentedLagrangian => minimise(task, at, Turn::of(max), buffers, work),
+        SolverChoice::FullAnticipation => match full_anticipation::run(task, at, max, &mut buffers.measure, work) {
             Some(run) => run,
-            None => anticipate(task, Inner::Paper, at, buffers, work, report),
+            None => anticipate(task, Inner::Paper, at, &mut buffers.measure, work, report),
         },
         SolverChoice::AcceleratedRelaxation => {
             let control = Control { iterations_max: max, patience: u32::MAX, passes: Passes::Growing };
-            accelerated_relaxation::run(task, coupled, at, control, buffers, work)
+            accelerated_relaxation::run(task, at, control, &mut buffers.relaxation, &mut buffers.measure, work)
         }
-        SolverChoice::Automatic if coupled.iter().any(|c| *c) => automatic(task, coupled, at, buffers, work, report),
+        SolverChoice::Automatic if task.coupled.iter().any(|c| *c) => automatic(task, at, buffers, work, report),
         SolverChoice::Automatic => automatic_uncoupled(task, at, buffers, work, report),
     };
     report.iterations = run.iterations;
@@ -190,17 +208,16 @@ fn anticipate(
     run
 }
 
+/// A turn of the augmented Lagrangian, its Newton systems factored where that is cheap.
+fn minimise(task: &Task, at: &mut Iterate, turn: Turn, buffers: &mut Buffers, work: &mut Work) -> Run {
+    let direct = buffers.direct.assign(task.problem);
+    buffers.lagrangian.run(task, direct, at, turn, &mut buffers.measure, work)
+}
+
 /// A short splitting start if asked for, relaxation with a pass an iteration, and where that is not enough the augmented
 /// Lagrangian in turn with relaxation: moving cloth that folds is solved sooner by the first, heaps and heavy bodies on
 /// light ones by the second, which makes as many passes as it takes.
-fn automatic(
-    task: &Task,
-    coupled: &[bool],
-    at: &mut Iterate,
-    buffers: &mut MeasureBuffers,
-    work: &mut Work,
-    report: &mut SolverReport,
-) -> Run {
+fn automatic(task: &Task, at: &mut Iterate, buffers: &mut Buffers, work: &mut Work, report: &mut SolverReport) -> Run {
     let max = task.settings.iterations_max;
     if task.settings.splitting_iterations > 0 {
         splitting_start::run(task, at, task.settings.splitting_iterations, work);
@@ -210,7 +227,7 @@ fn automatic(
     let mut control = Control { iterations_max: max, patience: PATIENCE, passes: Passes::One };
     loop {
         control.iterations_max = max - iterations;
-        let run = accelerated_relaxation::run(task, coupled, at, control, buffers, work);
+        let run = accelerated_relaxation::run(task, at, control, &mut buffers.relaxation, &mut buffers.measure, work);
         iterations += run.iterations;
         if run.ending != Ending::Stagnated || iterations >= max {
             return Run { iterations, ..run };
@@ -219,7 +236,7 @@ fn automatic(
         // What stiffer penalties did not solve is tried without.
         let stiffens = control.passes == Passes::One;
         let this = Turn { iterations_max: turn.min(max - iterations), patience: TURN_PATIENCE, stiffens };
-        let run = augmented_lagrangian::run(task, DirectNewton::new(task.problem), at, this, buffers, work);
+        let run = minimise(task, at, this, buffers, work);
         iterations += run.iterations;
         if run.ending == Ending::Converged || iterations >= max {
             return Run { iterations, ..run };
@@ -238,41 +255,41 @@ fn automatic(
 fn automatic_uncoupled(
     task: &Task,
     at: &mut Iterate,
-    buffers: &mut MeasureBuffers,
+    buffers: &mut Buffers,
     work: &mut Work,
     report: &mut SolverReport,
 ) -> Run {
     let max = task.settings.iterations_max;
     let mut iterations = 0;
-    let small = |direct: &DirectNewton| direct.work() <= FACTORED_FIRST * task.packed.contacts.len();
-    let mut best = Best::new(task, at, work);
-    if let Some(direct) = DirectNewton::new(task.problem).filter(small) {
+    let small = |direct: &&mut DirectNewton| direct.work() <= FACTORED_FIRST * task.packed.contacts.len();
+    buffers.best.start(task, at, work);
+    if let Some(direct) = buffers.direct.assign(task.problem).filter(small) {
         let left = (2 * UNCOUPLED_TURN).min(max / 2);
-        let run = augmented_lagrangian::run(task, Some(direct), at, Turn::of(left), buffers, work);
+        let run = buffers.lagrangian.run(task, Some(direct), at, Turn::of(left), &mut buffers.measure, work);
         iterations += run.iterations;
         // Velocities follow from the impulses here, and with those the contacts must hold.
-        if (best.take(task, at, work) && run.ending == Ending::Converged) || iterations >= max {
+        if (buffers.best.take(task, at, work) && run.ending == Ending::Converged) || iterations >= max {
             return run;
         }
         report.hand_overs += 1;
     }
     let mut turn = UNCOUPLED_TURN;
     loop {
-        let run = block_diagonal::solve(task, at, turn.min(max - iterations), work);
+        let run = block_diagonal::solve(task, at, turn.min(max - iterations), &mut buffers.passes, work);
         iterations += run.iterations;
         if run.ending == Ending::Converged {
             return Run { iterations, ..run };
         }
-        best.take(task, at, work);
+        buffers.best.take(task, at, work);
         if iterations >= max {
             return Run { iterations, ..run };
         }
         report.hand_overs += 1;
-        let (direct, left) = (DirectNewton::new(task.problem), (2 * turn).min(max - iterations));
-        let run = augmented_lagrangian::run(task, direct, at, Turn::of(left), buffers, work);
+        let left = (2 * turn).min(max - iterations);
+        let run = minimise(task, at, Turn::of(left), buffers, work);
         iterations += run.iterations;
         // Converged or not: with the velocities that follow from the impulses the passes have the last word.
-        best.take(task, at, work);
+        buffers.best.take(task, at, work);
         if iterations >= max {
             return Run { iterations, ending: Ending::Exhausted, error: None };
         }
@@ -312,21 +329,20 @@ fn is_coupled(problem: &ContactProblem, b: usize) -> bool {
     range.into_iter().any(|k| m.columns[k] as usize != b && m.values[k] != [[0.0; 3]; 3])
 }
 
-/// The warm start in sweep order: multipliers within their limits, infinite masses at rest, nothing that is not finite.
-fn warm_start(task: &Task, impulses: &[Vec3], dv: &[Vec3]) -> Iterate {
+/// Puts the warm start into `at`, in sweep order: multipliers within their limits, infinite masses at rest, nothing that
+/// is not finite.
+fn warm_start(task: &Task, impulses: &[Vec3], dv: &[Vec3], at: &mut Iterate) {
     let inverse = task.problem.inverse_diagonal;
     let usable = |b: usize| is_finite(dv[b]) && inverse[b] != [[0.0; 3]; 3];
     let cone = task.settings.friction_cone;
-    Iterate {
-        dv: task.par.map_indexed(dv.len(), |b| if usable(b) { dv[b] } else { [0.0; 3] }),
-        p: task.packed.contacts.iter().map(|c| project(cone, c.friction, impulses[c.source as usize])).collect(),
-    }
+    task.par.map_indexed_into(&mut at.dv, dv.len(), |b| if usable(b) { dv[b] } else { [0.0; 3] });
+    at.p.clear();
+    at.p.extend(task.packed.contacts.iter().map(|c| project(cone, c.friction, impulses[c.source as usize])));
 }
 
 /// Makes uncoupled blocks exact, and reports the residuals of what is handed back.
 fn finish(
     task: &Task,
-    coupled: &[bool],
     at: &mut Iterate,
     buffers: &mut MeasureBuffers,
     work: &mut Work,
@@ -340,20 +356,23 @@ fn finish(
         at.p.fill([0.0; 3]);
         report.converged = false;
     }
-    let mut forces = Vec::new();
-    task.packed.impulses(&at.p, &mut forces, task.par);
+    task.packed.impulses(&at.p, &mut buffers.impulses, task.par);
     let inverse = task.problem.inverse_diagonal;
     for (b, v) in at.dv.iter_mut().enumerate() {
-        if !coupled[b] {
-            *v = mat_vec(&inverse[b], task.packed.incidence.gather(b, &forces));
+        if !task.coupled[b] {
+            *v = mat_vec(&inverse[b], task.packed.incidence.gather(b, &buffers.impulses));
         }
     }
     let mut residuals = measure(task, at, buffers, work);
     if !report.converged {
-        let none = Iterate { dv: vec![[0.0; 3]; at.dv.len()], p: vec![[0.0; 3]; at.p.len()] };
-        if contact_residuals(task, &none.dv, &none.p).contact() < residuals.contact() {
+        let Iterate { dv, p } = &mut buffers.none;
+        for (none, count) in [(&mut *dv, at.dv.len()), (&mut *p, at.p.len())] {
+            none.clear();
+            none.resize(count, [0.0; 3]);
+        }
+        if contact_residuals(task, dv, p).contact() < residuals.contact() {
             // Worse than no response: the impulses would be the next step's warm start, and grow from step to step.
-            *at = none;
+            at.clone_from(&buffers.none);
             residuals = measure(task, at, buffers, work);
         }
     }

@@ -3,6 +3,7 @@
 
 use super::packed_contacts::{PackedContacts, contact_velocity};
 use super::problem::ContactProblem;
+use super::velocity_error::ErrorSystem;
 use crate::linalg::SinglePrecision;
 use crate::math::{Vec3, dot, mat_vec, sub};
 use crate::model::Settings;
@@ -16,6 +17,8 @@ pub(super) struct Task<'a> {
     pub packed: &'a PackedContacts,
     /// The metric in single precision.
     pub single: &'a SinglePrecision,
+    /// Whether the row of each block in the metric has entries beside its diagonal.
+    pub coupled: &'a [bool],
     /// Settings of the step.
     pub settings: &'a Settings,
     /// Scale of velocities `[m/s]`, positive.
@@ -28,12 +31,24 @@ pub(super) struct Task<'a> {
 }
 
 /// A candidate solution; `p` in sweep order.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub(super) struct Iterate {
     /// Velocity change per block `[m/s]`.
     pub dv: Vec<Vec3>,
     /// Multipliers per contact `[N s]`.
     pub p: Vec<Vec3>,
+}
+
+impl Clone for Iterate {
+    fn clone(&self) -> Iterate {
+        Iterate { dv: self.dv.clone(), p: self.p.clone() }
+    }
+
+    // The derived one would not keep the memory.
+    fn clone_from(&mut self, source: &Iterate) {
+        self.dv.clone_from(&source.dv);
+        self.p.clone_from(&source.p);
+    }
 }
 
 /// Work done, in entries touched: what a cap on time would be, but the same on every machine.
@@ -128,7 +143,7 @@ pub(super) fn contact_residuals(task: &Task, dv: &[Vec3], p: &[Vec3]) -> Residua
     total
 }
 
-/// Buffers of [`measure`] and of what judges an iterate by it.
+/// Buffers of [`measure`] and of what judges an iterate by it; capacity is kept.
 #[derive(Default)]
 pub(super) struct MeasureBuffers {
     /// World impulses of the last call.
@@ -139,6 +154,12 @@ pub(super) struct MeasureBuffers {
     pub contact: Vec<Vec3>,
     /// The iterate last judged, with its momentum balanced.
     pub balanced: Vec<Vec3>,
+    /// The translations that balanced it.
+    pub translations: Vec<Vec3>,
+    /// What estimates its velocity error.
+    pub error: ErrorSystem,
+    /// No response at all.
+    pub none: Iterate,
 }
 
 /// All residuals of an iterate, from `dv` and `p` alone. Cost: one product with A and one pass over the contacts.

@@ -7,7 +7,8 @@
 //! All contacts are screened now and then, with their normal velocity alone; those that press, or should, get a record. In crowded scenes nine of ten contacts never do.
 
 use super::friction::{LocalMetric, project};
-use super::packed_contacts::{PackedContacts, contact_velocity};
+use super::packed_contacts::contact_velocity;
+use super::residuals::Task;
 use super::translation_level::{Sides, TranslationLevel};
 use crate::constraint::RowSet;
 use crate::linalg::power_of_two;
@@ -67,10 +68,9 @@ pub(super) struct GeneralRows {
     angular: Vec<(u32, Quad)>,
 }
 
-/// The contacts of a problem, rounded.
-pub(super) struct SinglePass<'a> {
-    packed: &'a PackedContacts,
-    rows: &'a RowSet,
+/// The contacts of a task, rounded, and which of them are near; capacity is kept.
+#[derive(Default)]
+pub(super) struct SinglePass {
     screens: Vec<Screen>,
     /// Contacts that were near at some time, and the record of each contact.
     records: Vec<Record>,
@@ -89,36 +89,27 @@ pub(super) struct SinglePass<'a> {
     bases: u32,
 }
 
-impl<'a> SinglePass<'a> {
-    /// Takes over the contacts; `mass` is a power of two, `velocity` typical of the problem.
-    pub fn new(
-        packed: &'a PackedContacts,
-        rows: &'a RowSet,
-        level: TranslationLevel,
-        (mass, velocity): (f64, f64),
-    ) -> SinglePass<'a> {
-        let velocity = power_of_two(velocity);
-        let screens = packed.contacts.iter().map(|contact| {
+impl SinglePass {
+    /// Takes over the contacts, with or without a second level of the metric; none is near.
+    pub fn assign(&mut self, task: &Task, level: bool) {
+        let Task { problem, packed, single, .. } = *task;
+        self.mass = single.unit();
+        self.velocity = power_of_two(task.velocity_scale);
+        self.bases = 0;
+        let velocity = self.velocity;
+        self.screens.clear();
+        self.screens.extend(packed.contacts.iter().map(|contact| {
             let n = contact.frame[0];
             let plane = Quad::new([n[0] as f32, n[1] as f32, n[2] as f32, (contact.target[0] / velocity) as f32]);
             let blocks = if contact.general { [NONE; 4] } else { contact.blocks };
             Screen { blocks, weights: contact.weights.map(|w| w as f32), plane }
-        });
-        SinglePass {
-            packed,
-            rows,
-            screens: screens.collect(),
-            records: Vec::new(),
-            record_of: vec![NONE; packed.contacts.len()],
-            general: GeneralRows::default(),
-            level,
-            near: Vec::new(),
-            inverse: Vec::new(),
-            exact_inverse: Vec::new(),
-            velocity,
-            mass,
-            bases: 0,
-        }
+        }));
+        self.records.clear();
+        self.record_of.clear();
+        self.record_of.resize(packed.contacts.len(), NONE);
+        self.general.clear();
+        self.level.assign(problem.translations.filter(|_| level), problem.inverse_diagonal.len(), self.mass);
+        self.near.clear();
     }
 
     /// Velocity `[m/s]` that rounded velocities are relative to.
@@ -132,29 +123,29 @@ impl<'a> SinglePass<'a> {
     }
 
     /// Takes a new block-diagonal metric.
-    pub fn set_metric(&mut self, inverse: Vec<Mat3>) {
-        let m = self.mass;
+    pub fn set_metric(&mut self, task: &Task, inverse: impl Fn(usize) -> Mat3 + Sync) {
+        let (m, exact) = (self.mass, &mut self.exact_inverse);
+        task.par.map_indexed_into(exact, task.problem.inverse_diagonal.len(), inverse);
         self.inverse.clear();
-        self.inverse.extend(inverse.iter().map(|a| [0, 1, 2].map(|c| Quad::round([a[0][c], a[1][c], a[2][c]], m))));
-        self.exact_inverse = inverse;
-        self.measure_records();
+        self.inverse.extend(exact.iter().map(|a| [0, 1, 2].map(|c| Quad::round([a[0][c], a[1][c], a[2][c]], m))));
+        self.measure_records(task);
     }
 
-    fn measure_records(&mut self) {
+    fn measure_records(&mut self, task: &Task) {
         for i in 0..self.records.len() {
-            self.records[i] = self.measured(self.records[i]);
+            self.records[i] = self.measured(task, self.records[i]);
         }
     }
 
     /// The record with the local metric of its contact.
-    fn measured(&self, mut record: Record) -> Record {
-        let m = self.mass;
+    fn measured(&self, task: &Task, mut record: Record) -> Record {
+        let (m, packed) = (self.mass, task.packed);
         let c = record.contact as usize;
-        let own = self.packed.world_metric(c, self.rows, &self.exact_inverse);
-        let [normal, _, _, a, _, b] = self.packed.in_frame(c, &own);
+        let own = packed.world_metric(c, task.problem.rows, &self.exact_inverse);
+        let [normal, _, _, a, _, b] = packed.in_frame(c, &own);
         let rubs = record.normal[3] > 0.0;
         record.compliance = if rubs { 3.0 / (1.0 / normal + 1.0 / a + 1.0 / b) } else { normal };
-        let metric = LocalMetric::new(self.packed.in_frame(c, &mat_add(&own, &self.level.metric(&record.sides))));
+        let metric = LocalMetric::new(packed.in_frame(c, &mat_add(&own, &self.level.metric(&record.sides))));
         let LocalMetric { entries, normal_inverse, tangent_inverse, tangent_step } = metric;
         let [nn, n1, n2, a, b, c] = entries.map(|g| (m * g) as f32);
         let [i, j, k] = tangent_inverse.map(|g| (g / m) as f32);
@@ -175,15 +166,15 @@ impl<'a> SinglePass<'a> {
     }
 
     /// Weighs the second level by the contacts that are near.
-    pub fn weigh(&mut self) {
+    pub fn weigh(&mut self, task: &Task) {
         let near = self.near.iter().map(|r| &self.records[*r as usize]);
         if self.level.weigh(near.map(|r| (&r.sides, r.compliance))) {
-            self.measure_records();
+            self.measure_records(task);
         }
     }
 
     /// Starts from multipliers: those that press are near.
-    pub fn start(&mut self, p: &[Vec3], base: &[Vec3]) {
+    pub fn start(&mut self, task: &Task, p: &[Vec3], base: &[Vec3]) {
         self.bases += 1;
         self.near.clear();
         let pressing = p.iter().filter(|p| p[0] > 0.0).count();
@@ -191,7 +182,7 @@ impl<'a> SinglePass<'a> {
         self.records.reserve(pressing);
         for (c, p) in p.iter().enumerate() {
             if p[0] > 0.0 {
-                let r = self.record(c, base);
+                let r = self.record(task, c, base);
                 let p = Quad::round(*p, 1.0 / (self.mass * self.velocity));
                 (self.records[r].p, self.records[r].pressure) = (p, p.lanes()[0]);
                 self.near.push(r as u32);
@@ -200,27 +191,28 @@ impl<'a> SinglePass<'a> {
     }
 
     /// Takes `base` as what velocities are relative to from now on.
-    pub fn renew(&mut self, base: &[Vec3]) {
+    pub fn renew(&mut self, task: &Task, base: &[Vec3]) {
         self.bases += 1;
         for i in 0..self.near.len() {
-            self.aim(self.near[i] as usize, base);
+            self.aim(task, self.near[i] as usize, base);
         }
     }
 
     /// The target of record `r` for this base.
-    fn aim(&mut self, r: usize, base: &[Vec3]) {
-        let contact = &self.packed.contacts[self.records[r].contact as usize];
-        self.records[r].target = Quad::round(contact_velocity(contact, self.rows, base), 1.0 / self.velocity);
+    fn aim(&mut self, task: &Task, r: usize, base: &[Vec3]) {
+        let contact = &task.packed.contacts[self.records[r].contact as usize];
+        self.records[r].target = Quad::round(contact_velocity(contact, task.problem.rows, base), 1.0 / self.velocity);
         self.records[r].base = self.bases;
     }
 
     /// The record of contact `c`, made if need be, up to date.
-    fn record(&mut self, c: usize, base: &[Vec3]) -> usize {
+    fn record(&mut self, task: &Task, c: usize, base: &[Vec3]) -> usize {
+        let rows = task.problem.rows;
         let mut r = self.record_of[c] as usize;
         if self.record_of[c] == NONE {
             r = self.records.len();
             self.record_of[c] = r as u32;
-            let contact = &self.packed.contacts[c];
+            let contact = &task.packed.contacts[c];
             let f = contact.frame;
             let mut record = Record {
                 blocks: contact.blocks,
@@ -228,31 +220,31 @@ impl<'a> SinglePass<'a> {
                 rows: f.map(|v| Quad::round(v, 1.0)),
                 columns: [0, 1, 2].map(|axis| Quad::round([f[0][axis], f[1][axis], f[2][axis]], 1.0)),
                 general: NONE,
-                sides: self.level.sides(self.rows, contact.source as usize),
+                sides: self.level.sides(rows, contact.source as usize),
                 contact: c as u32,
                 ..Record::default()
             };
             record.normal[3] = contact.friction as f32;
             if contact.general {
-                record.general = self.general.push(self.rows, contact.source as usize);
+                record.general = self.general.push(rows, contact.source as usize);
             }
-            let record = self.measured(record);
+            let record = self.measured(task, record);
             self.records.push(record);
         }
         if self.records[r].base != self.bases {
-            self.aim(r, base);
+            self.aim(task, r, base);
         }
         r
     }
 
     /// Finds the contacts that press, or whose law the velocities `v` (not increments) violate.
-    pub fn screen(&mut self, v: &[Quad], base: &[Vec3]) -> u64 {
+    pub fn screen(&mut self, task: &Task, v: &[Quad], base: &[Vec3]) -> u64 {
         self.near.clear();
         for c in 0..self.screens.len() {
             let r = self.record_of[c];
             let presses = r != NONE && self.records[r as usize].pressure > 0.0;
-            if presses || self.normal_velocity(c, v) < 0.0 {
-                let r = self.record(c, base);
+            if presses || self.normal_velocity(task, c, v) < 0.0 {
+                let r = self.record(task, c, base);
                 self.near.push(r as u32);
             }
         }
@@ -261,12 +253,12 @@ impl<'a> SinglePass<'a> {
 
     /// Normal velocity of contact `c`, target included.
     #[inline(always)]
-    fn normal_velocity(&self, c: usize, v: &[Quad]) -> f32 {
+    fn normal_velocity(&self, task: &Task, c: usize, v: &[Quad]) -> f32 {
         let screen = &self.screens[c];
         if screen.blocks[0] != NONE {
             return screen.normal_velocity(seen(&screen.blocks, &screen.weights, v));
         }
-        let (rows, i) = (self.rows, self.packed.contacts[c].source as usize);
+        let (rows, i) = (task.problem.rows, task.packed.contacts[c].source as usize);
         let linear = rows.offsets[i] as usize..rows.offsets[i + 1] as usize;
         let angular = rows.angular_offsets[i] as usize..rows.angular_offsets[i + 1] as usize;
         let mut u = Quad::default();
@@ -280,11 +272,11 @@ impl<'a> SinglePass<'a> {
     }
 
     /// Puts the multipliers of all records into `p`, in units of the problem and within their limits in f64 too.
-    pub fn multipliers(&self, cone: FrictionCone, p: &mut [Vec3]) {
+    pub fn multipliers(&self, task: &Task, p: &mut [Vec3]) {
         let s = self.mass * self.velocity;
         for record in &self.records {
             let c = record.contact as usize;
-            p[c] = project(cone, self.packed.contacts[c].friction, record.p.widen(s));
+            p[c] = project(task.settings.friction_cone, task.packed.contacts[c].friction, record.p.widen(s));
         }
     }
 

@@ -24,10 +24,10 @@ struct Node {
     a_z: Quad,
 }
 
-/// The state between two measurements.
-pub(super) struct SingleRelaxation<'a, 'b> {
-    task: &'b Task<'a>,
-    contacts: SinglePass<'b>,
+/// The state between two measurements; capacity is kept from run to run.
+#[derive(Default)]
+pub(super) struct SingleRelaxation {
+    contacts: SinglePass,
     /// Scale of the metric by block: that of S where the block is coupled, else 1.
     block_scale: Vec<f32>,
     /// What increments are relative to; the same rounded.
@@ -40,54 +40,51 @@ pub(super) struct SingleRelaxation<'a, 'b> {
     a_u: Vec<Quad>,
     /// Velocities that contacts are screened by.
     velocities: Vec<Quad>,
-    momentum: Momentum<'b>,
+    /// `C^T p` of the start, and `C^T p - A base`.
+    forces: Vec<Vec3>,
+    gradient: Vec<Quad>,
+    momentum: Momentum,
     iteration: u32,
     work: Work,
 }
 
-impl<'a, 'b> SingleRelaxation<'a, 'b> {
+impl SingleRelaxation {
     /// Starts from `at` with this scale of the metric, with or without its second level.
-    pub fn new(task: &'b Task<'a>, coupled: &'b [bool], at: &Iterate, metric_scale: f64, level: bool) -> Self {
+    pub fn start(&mut self, task: &Task, at: &Iterate, metric_scale: f64, level: bool) {
         let blocks = at.dv.len();
-        let mass = task.single.unit();
-        let level = TranslationLevel::new(task.problem.translations.filter(|_| level), blocks, mass);
-        let contacts = SinglePass::new(task.packed, task.problem.rows, level, (mass, task.velocity_scale));
-        let mut r = SingleRelaxation {
-            task,
-            contacts,
-            block_scale: Vec::new(),
-            base: at.dv.clone(),
-            base_rounded: Vec::new(),
-            nodes: vec![Node::default(); blocks],
-            u: vec![Quad::default(); blocks],
-            a_u: vec![Quad::default(); blocks],
-            velocities: Vec::new(),
-            momentum: Momentum::new(coupled, metric_scale),
-            iteration: 0,
-            work: Work::default(),
-        };
-        r.set_scale();
-        r.contacts.start(&at.p, &at.dv);
-        let mut forces = vec![[0.0; 3]; blocks];
-        task.packed.scatter(task.problem.rows, r.contacts.near(), &at.p, &mut forces);
-        r.renew_base();
-        r.screen();
-        r.contacts.weigh();
-        let unit = 1.0 / (mass * r.contacts.velocity_unit());
+        self.contacts.assign(task, level);
+        self.base.clone_from(&at.dv);
+        self.nodes.clear();
+        self.nodes.resize(blocks, Node::default());
+        for buffer in [&mut self.u, &mut self.a_u] {
+            buffer.clear();
+            buffer.resize(blocks, Quad::default());
+        }
+        self.momentum = Momentum::new(metric_scale);
+        (self.iteration, self.work) = (0, Work::default());
+        self.set_scale(task);
+        self.contacts.start(task, &at.p, &at.dv);
+        self.forces.clear();
+        self.forces.resize(blocks, [0.0; 3]);
+        task.packed.scatter(task.problem.rows, self.contacts.near(), &at.p, &mut self.forces);
+        self.renew_base();
+        self.screen(task);
+        self.contacts.weigh(task);
+        let unit = 1.0 / (task.single.unit() * self.contacts.velocity_unit());
         let product = |b: usize| task.problem.matrix.row_product(b, &at.dv);
-        let gradient = task.par.map_indexed(blocks, |b| Quad::round(math::sub(forces[b], product(b)), unit));
-        r.extrapolate((0.0, 1.0), Some(&gradient));
-        r.work.blocks += task.problem.matrix.values.len() as u64;
-        r
+        let forces = &self.forces;
+        let gradient = |b: usize| Quad::round(math::sub(forces[b], product(b)), unit);
+        task.par.map_indexed_into(&mut self.gradient, blocks, gradient);
+        self.extrapolate(task, (0.0, 1.0), true);
+        self.work.blocks += task.problem.matrix.values.len() as u64;
     }
 
-    fn set_scale(&mut self) {
-        let source = self.task.problem.inverse_diagonal;
-        let m = &self.momentum;
-        self.contacts
-            .set_metric(self.task.par.map_indexed(source.len(), |b| mat_scale(1.0 / m.block_scale(b), &source[b])));
+    fn set_scale(&mut self, task: &Task) {
+        let (source, momentum) = (task.problem.inverse_diagonal, &self.momentum);
+        let block_scale = |b: usize| momentum.block_scale(task.coupled[b]);
+        self.contacts.set_metric(task, |b| mat_scale(1.0 / block_scale(b), &source[b]));
         self.block_scale.clear();
-        self.block_scale.extend((0..source.len()).map(|b| m.block_scale(b) as f32));
+        self.block_scale.extend((0..source.len()).map(|b| block_scale(b) as f32));
     }
 
     fn renew_base(&mut self) {
@@ -97,108 +94,108 @@ impl<'a, 'b> SingleRelaxation<'a, 'b> {
     }
 
     /// Makes iterations, the last one without extrapolation.
-    pub fn advance(&mut self, iterations: u32, passes: u32) {
+    pub fn advance(&mut self, task: &Task, iterations: u32, passes: u32) {
         for i in 1..=iterations {
             if self.iteration < SCREEN.0 || self.iteration.is_multiple_of(SCREEN.1) {
-                self.screen();
+                self.screen(task);
             }
             for _ in 0..passes {
-                self.work.contacts += self.contacts.pass(self.task.settings.friction_cone, &mut self.u);
+                self.work.contacts += self.contacts.pass(task.settings.friction_cone, &mut self.u);
             }
             self.contacts.level_mut().settle(&mut self.u);
-            let sums = self.product();
+            let sums = self.product(task);
             if self.momentum.observe(sums) {
-                self.set_scale();
+                self.set_scale(task);
             }
             self.iteration += 1;
             if i < iterations {
                 let step = self.momentum.next();
-                self.extrapolate(step, None);
+                self.extrapolate(task, step, false);
             }
         }
     }
 
-    fn screen(&mut self) {
+    fn screen(&mut self, task: &Task) {
         let (base, u) = (&self.base_rounded, &self.u);
         self.velocities.resize(u.len(), Quad::default());
-        self.task.par.map_into(&mut self.velocities, |b| base[b] + u[b]);
-        self.work.contacts += self.contacts.screen(&self.velocities, &self.base);
+        task.par.map_into(&mut self.velocities, |b| base[b] + u[b]);
+        self.work.contacts += self.contacts.screen(task, &self.velocities, &self.base);
     }
 
     /// `A dv'` and the sums that steer step and momentum.
-    fn product(&mut self) -> Sums {
-        let (matrix, level) = (self.task.single, self.contacts.level());
+    fn product(&mut self, task: &Task) -> Sums {
+        let (matrix, level) = (task.single, self.contacts.level());
         let (u, nodes, block_scale) = (&self.u[..], &self.nodes[..], &self.block_scale[..]);
         let mut total = Sums::default();
-        self.task.par.fold_tasks(
+        task.par.fold_tasks(
             self.a_u.chunks_mut(BLOCK).enumerate(),
             |(i, out)| run_wide(Product { matrix, u, nodes, block_scale, level, start: i * BLOCK, out }),
             |sums| total = total.plus(&sums),
         );
         self.contacts.level_mut().observe(&self.a_u);
-        self.work.blocks += self.task.problem.matrix.values.len() as u64;
+        self.work.blocks += task.problem.matrix.values.len() as u64;
         total
     }
 
     /// Puts the iterate into `now`, `A dv'` and `C^T p` into the buffers; returns the residuals. Contacts that are not
     /// near only count once the others have passed.
-    pub fn measure(&mut self, now: &mut Iterate, buffers: &mut MeasureBuffers) -> Residuals {
-        let Task { problem, packed, settings, par, .. } = *self.task;
+    pub fn measure(&mut self, task: &Task, now: &mut Iterate, buffers: &mut MeasureBuffers) -> Residuals {
+        let Task { problem, packed, settings, par, .. } = *task;
         let unit = self.contacts.velocity_unit();
         let (base, u) = (&self.base, &self.u);
         now.dv.resize(u.len(), [0.0; 3]);
         par.map_into(&mut now.dv, |b| math::add(base[b], u[b].widen(unit)));
+        now.p.clear();
         now.p.resize(packed.contacts.len(), [0.0; 3]);
-        self.contacts.multipliers(settings.friction_cone, &mut now.p);
+        self.contacts.multipliers(task, &mut now.p);
         let (dv, list) = (&now.dv, self.contacts.near());
         buffers.product.resize(dv.len(), [0.0; 3]);
         problem.matrix.product(dv, &mut buffers.product, par);
         buffers.contact.clear();
         buffers.contact.resize(dv.len(), [0.0; 3]);
         packed.scatter(problem.rows, self.contacts.near(), &now.p, &mut buffers.contact);
-        let mut residuals = near_residuals(self.task, list, dv, &now.p);
+        let mut residuals = near_residuals(task, list, dv, &now.p);
         self.work.contacts += self.contacts.near().len() as u64;
         self.work.blocks += problem.matrix.values.len() as u64;
-        residuals.dynamics = dynamics_residual(self.task, &buffers.product, &buffers.contact);
+        residuals.dynamics = dynamics_residual(task, &buffers.product, &buffers.contact);
         if residuals.contact() <= settings.contact_tolerance {
-            residuals = Residuals { dynamics: residuals.dynamics, ..contact_residuals(self.task, dv, &now.p) };
+            residuals = Residuals { dynamics: residuals.dynamics, ..contact_residuals(task, dv, &now.p) };
             self.work.contacts += now.p.len() as u64;
         }
         residuals
     }
 
     /// Continues from what was just measured: the base moves there, and the prediction follows from the exact residual.
-    pub fn renew(&mut self, measured: &Iterate, buffers: &MeasureBuffers) {
+    pub fn renew(&mut self, task: &Task, measured: &Iterate, buffers: &MeasureBuffers) {
         self.base.clone_from(&measured.dv);
         self.renew_base();
-        self.contacts.renew(&self.base);
+        self.contacts.renew(task, &self.base);
         for ((node, u), a_u) in self.nodes.iter_mut().zip(&mut self.u).zip(&mut self.a_u) {
             *node = Node { dv: node.dv - *u, a_dv: node.a_dv - *a_u, z: node.z - *u, a_z: node.a_z - *a_u };
             (*u, *a_u) = Default::default();
         }
         self.contacts.level_mut().renew();
-        self.contacts.weigh();
-        let unit = 1.0 / (self.task.single.unit() * self.contacts.velocity_unit());
-        let gradient: Vec<Quad> = self
-            .task
-            .par
-            .map_indexed(self.u.len(), |b| Quad::round(math::sub(buffers.contact[b], buffers.product[b]), unit));
+        self.contacts.weigh(task);
+        let unit = 1.0 / (task.single.unit() * self.contacts.velocity_unit());
+        let gradient = |b: usize| Quad::round(math::sub(buffers.contact[b], buffers.product[b]), unit);
+        task.par.map_indexed_into(&mut self.gradient, self.u.len(), gradient);
         let step = self.momentum.next();
-        self.extrapolate(step, Some(&gradient));
+        self.extrapolate(task, step, true);
     }
 
-    /// The next prediction. `gradient` is `C^T p - A base` where that is known; else it follows from the prediction that
-    /// was relaxed.
-    fn extrapolate(&mut self, (beta, change): (f64, f64), gradient: Option<&[Quad]>) {
+    /// The next prediction: from `self.gradient` where that was `renewed`; else it follows from the prediction that was
+    /// relaxed.
+    fn extrapolate(&mut self, task: &Task, (beta, change): (f64, f64), renewed: bool) {
+        let gradient = renewed.then_some(&self.gradient[..]);
         let (beta, change) = (beta as f32, change as f32);
         self.contacts.level_mut().predict(beta, gradient);
         let (a_u, inverse, level) = (&self.a_u[..], self.contacts.inverse(), self.contacts.level());
-        let coupled = self.momentum.coupled;
+        let coupled = task.coupled;
         let chunks = self.nodes.chunks_mut(BLOCK).zip(self.u.chunks_mut(BLOCK));
         let block = |(i, (nodes, u)): (usize, (&mut [Node], &mut [Quad]))| {
             run_wide(Extrapolate { nodes, u, a_u, inverse, level, gradient, coupled, beta, change, start: i * BLOCK });
         };
-        self.task.par.fold_tasks(chunks.enumerate(), block, |()| {});
+        task.par.fold_tasks(chunks.enumerate(), block, |()| {});
     }
 
     /// Work so far.

@@ -95,10 +95,11 @@ impl StopTest {
 
 /// Translates what is coupled by the momentum that it lacks, the softest mode; whether the rows still hold.
 fn balanced(task: &Task, at: &Iterate, buffers: &mut MeasureBuffers, work: &mut Work) -> bool {
-    let MeasureBuffers { product, contact, balanced, .. } = buffers;
+    let MeasureBuffers { product, contact, balanced, translations: missing, .. } = buffers;
     balanced.clone_from(&at.dv);
     let Some(translations) = task.problem.translations else { return true };
-    let moved = translations.translate(&translations.missing(contact, product), balanced);
+    translations.missing_into(contact, product, missing);
+    let moved = translations.translate(missing, balanced);
     let tolerance = task.settings.contact_tolerance;
     // A row weighs both its sides with one at most.
     if 2.0 * moved <= ROUNDING * tolerance * task.velocity_scale {

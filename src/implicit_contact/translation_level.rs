@@ -36,7 +36,7 @@ struct Component {
     a_z: Quad,
 }
 
-/// The components of a metric.
+/// The components of a metric; capacity is kept.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TranslationLevel {
     /// Component of each block; those that belong to none share the last one, which stays where it is.
@@ -44,6 +44,8 @@ pub(super) struct TranslationLevel {
     components: Vec<Component>,
     /// Blocks that follow each other in one component: from, to, component.
     stretches: Vec<[u32; 3]>,
+    /// Number of contacts of each component and the sum of their compliances.
+    sums: Vec<(f64, f64)>,
     /// What rounded masses are relative to.
     mass: f64,
 }
@@ -62,18 +64,20 @@ impl Default for Sides {
 }
 
 impl TranslationLevel {
-    /// The components of `translations`, none without or where there is but one (a cloth alone waits for its stretching);
-    /// rounded masses are relative to `mass`.
-    pub fn new(translations: Option<&Translations>, blocks: usize, mass: f64) -> TranslationLevel {
+    /// Takes the components of `translations`, none without or where there is but one (a cloth alone waits for its
+    /// stretching); rounded masses are relative to `mass`.
+    pub fn assign(&mut self, translations: Option<&Translations>, blocks: usize, mass: f64) {
+        let TranslationLevel { component, components, stretches, .. } = self;
         let translations = translations.filter(|t| t.inverse_masses().len() > 1);
         let masses = translations.map_or(&[][..], |t| t.inverse_masses());
         let of = |b: usize| translations.and_then(|t| t.component(b)).unwrap_or(masses.len()) as u32;
-        let mut components: Vec<Component> =
-            masses.iter().map(|m| Component { inverse_mass: *m, ..Component::default() }).collect();
+        components.clear();
+        components.extend(masses.iter().map(|m| Component { inverse_mass: *m, ..Component::default() }));
         components.iter_mut().for_each(|c| c.take(1.0, mass));
         components.push(Component::default());
-        let component: Vec<u32> = (0..blocks).map(of).collect();
-        let mut stretches = Vec::new();
+        component.clear();
+        component.extend((0..blocks).map(of));
+        stretches.clear();
         let mut start = 0;
         for same in component.chunk_by(|a, b| a == b) {
             let end = start + same.len() as u32;
@@ -82,7 +86,7 @@ impl TranslationLevel {
             }
             start = end;
         }
-        TranslationLevel { component, components, stretches, mass }
+        self.mass = mass;
     }
 
     /// The sides of row `i`.
@@ -107,7 +111,9 @@ impl TranslationLevel {
     /// a component give each other through it shall not be more than what one gives by itself. Returns whether anything
     /// changed.
     pub fn weigh<'a>(&mut self, contacts: impl Iterator<Item = (&'a Sides, f64)>) -> bool {
-        let mut sums = vec![(0.0, 0.0); self.components.len()];
+        let TranslationLevel { components, sums, mass, .. } = self;
+        sums.clear();
+        sums.resize(components.len(), (0.0, 0.0));
         for (sides, compliance) in contacts {
             for c in sides.components.iter().filter(|c| **c != NONE) {
                 let (count, sum) = &mut sums[*c as usize];
@@ -116,12 +122,12 @@ impl TranslationLevel {
             }
         }
         let mut changed = false;
-        for (c, (count, sum)) in self.components.iter_mut().zip(sums).filter(|(_, sums)| sums.0 > 0.0) {
+        for (c, (count, sum)) in components.iter_mut().zip(sums).filter(|(_, sums)| sums.0 > 0.0) {
             let m = &c.inverse_mass;
             let own = (m[0][0] + m[1][1] + m[2][2]) / 3.0;
-            let share = (sum / count / (count * own)).min(1.0);
+            let share = (*sum / *count / (*count * own)).min(1.0);
             if share < OFF.0 * c.share || share > OFF.1 * c.share {
-                c.take(share, self.mass);
+                c.take(share, *mass);
                 changed = true;
             }
         }

@@ -4,7 +4,7 @@ use super::residuals::{Iterate, MeasureBuffers, Residuals, Task, Work};
 use crate::linalg::{SinglePrecision, power_of_two};
 use crate::math::simd::{Kernel, Quad, run_wide};
 use crate::math::{dot, sub};
-use crate::parallel::{BLOCK, Par};
+use crate::parallel::BLOCK;
 
 /// Conjugate gradient steps of the estimate at most.
 const STEPS: usize = 24;
@@ -34,7 +34,8 @@ pub(super) fn velocity_error(
     buffers: &mut MeasureBuffers,
     work: &mut Work,
 ) -> f64 {
-    let (dv, product, contact) = (&at.dv, &buffers.product, &buffers.contact);
+    let MeasureBuffers { product, contact, error: system, .. } = buffers;
+    let dv = &at.dv;
     let blocks = dv.len();
     let energy = task.par.sum(blocks, |b| dot(dv[b], product[b]));
     let scale = energy.max(task.impulse_floor * task.impulse_floor);
@@ -45,20 +46,17 @@ pub(super) fn velocity_error(
         m.max(r[0].abs()).max(r[1].abs()).max(r[2].abs())
     });
     let (mass, unit) = (task.single.unit(), power_of_two(largest));
-    let mut system = ErrorSystem {
-        matrix: task.single,
-        inverse: task.par.map_indexed(blocks, |b| {
-            let a = &task.problem.inverse_diagonal[b];
-            [0, 1, 2].map(|c| Quad::round([a[0][c], a[1][c], a[2][c]], mass))
-        }),
-        residual: task.par.map_indexed(blocks, |b| Quad::round(sub(contact[b], product[b]), 1.0 / unit)),
-        preconditioned: vec![Quad::default(); blocks],
-        direction: vec![Quad::default(); blocks],
-        image: vec![Quad::default(); blocks],
-        par: task.par,
-    };
+    task.par.map_indexed_into(&mut system.inverse, blocks, |b| {
+        let a = &task.problem.inverse_diagonal[b];
+        [0, 1, 2].map(|c| Quad::round([a[0][c], a[1][c], a[2][c]], mass))
+    });
+    task.par.map_indexed_into(&mut system.residual, blocks, |b| Quad::round(sub(contact[b], product[b]), 1.0 / unit));
+    for buffer in [&mut system.preconditioned, &mut system.direction, &mut system.image] {
+        buffer.clear();
+        buffer.resize(blocks, Quad::default());
+    }
     // The sum is of squares of impulses over masses.
-    let (terms, steps) = system.terms(enough * mass / (unit * unit));
+    let (terms, steps) = system.terms(task, enough * mass / (unit * unit));
     work.blocks += steps as u64 * task.problem.matrix.values.len() as u64;
     let total: f64 = terms[..steps].iter().sum();
     let tail = geometric_tail(&terms[..steps]);
@@ -66,28 +64,27 @@ pub(super) fn velocity_error(
     if error.is_finite() { error } else { f64::INFINITY }
 }
 
-/// Conjugate gradients on `A e = r`, for the squared error that each step takes away.
-struct ErrorSystem<'a> {
-    matrix: &'a SinglePrecision,
+/// Conjugate gradients on `A e = r`, for the squared error that each step takes away; capacity is kept.
+#[derive(Default)]
+pub(super) struct ErrorSystem {
     inverse: Vec<[Quad; 3]>,
     residual: Vec<Quad>,
     preconditioned: Vec<Quad>,
     direction: Vec<Quad>,
     image: Vec<Quad>,
-    par: Par<'a>,
 }
 
-impl ErrorSystem<'_> {
+impl ErrorSystem {
     /// The terms, and how many there are; ends early once their sum is above `enough` or hardly grows.
-    fn terms(&mut self, enough: f64) -> ([f64; STEPS], usize) {
+    fn terms(&mut self, task: &Task, enough: f64) -> ([f64; STEPS], usize) {
         let mut terms = [0.0; STEPS];
         let (mut total, mut beta) = (0.0, 0.0);
-        let mut rho = self.descend(0.0);
+        let mut rho = self.descend(task, 0.0);
         for step in 0..STEPS {
             if rho <= 0.0 {
                 return (terms, step);
             }
-            let curvature = self.advance(beta);
+            let curvature = self.advance(task, beta);
             if curvature.is_nan() || curvature <= 0.0 {
                 return (terms, step);
             }
@@ -98,7 +95,7 @@ impl ErrorSystem<'_> {
             if little || total > enough {
                 return (terms, step + 1);
             }
-            let next = self.descend(alpha);
+            let next = self.descend(task, alpha);
             beta = next / rho;
             rho = next;
         }
@@ -106,14 +103,14 @@ impl ErrorSystem<'_> {
     }
 
     /// Next direction and its image; returns the curvature.
-    fn advance(&mut self, beta: f64) -> f64 {
+    fn advance(&mut self, task: &Task, beta: f64) -> f64 {
         let preconditioned = &self.preconditioned[..];
-        self.par.for_each_block(&mut self.direction, |start, d| {
+        task.par.for_each_block(&mut self.direction, |start, d| {
             run_wide(Turn { d, z: &preconditioned[start..], beta: beta as f32 });
         });
-        let (matrix, d) = (self.matrix, &self.direction[..]);
+        let (matrix, d) = (task.single, &self.direction[..]);
         let mut total = 0.0;
-        self.par.fold_tasks(
+        task.par.fold_tasks(
             self.image.chunks_mut(BLOCK).enumerate(),
             |(i, out)| run_wide(Image { matrix, d, start: i * BLOCK, out }),
             |sum| total += sum,
@@ -122,7 +119,7 @@ impl ErrorSystem<'_> {
     }
 
     /// Takes `alpha` images off the residual; returns its square in the norm of the inverse diagonal.
-    fn descend(&mut self, alpha: f64) -> f64 {
+    fn descend(&mut self, task: &Task, alpha: f64) -> f64 {
         let (inverse, image) = (&self.inverse[..], &self.image[..]);
         let parts = self.residual.chunks_mut(BLOCK).zip(self.preconditioned.chunks_mut(BLOCK)).enumerate();
         let block = |(i, (r, z)): (usize, (&mut [Quad], &mut [Quad]))| {
@@ -130,7 +127,7 @@ impl ErrorSystem<'_> {
             run_wide(&mut Descend { r, z, inverse: &inverse[s..], image: &image[s..], alpha: alpha as f32 })
         };
         let mut total = 0.0;
-        self.par.fold_tasks(parts, block, |sum| total += sum);
+        task.par.fold_tasks(parts, block, |sum| total += sum);
         total
     }
 }

@@ -31,19 +31,29 @@ impl BlockMatrix {
     ///
     /// Cost: a sort of the pairs.
     pub fn from_places(rows: usize, mut places: Vec<(u32, u32)>) -> BlockMatrix {
+        let mut matrix = BlockMatrix::default();
+        matrix.assign_places(rows, &mut places);
+        matrix
+    }
+
+    /// Makes this the matrix of [`BlockMatrix::from_places`], in the memory that it has; leaves the places of its pattern.
+    pub fn assign_places(&mut self, rows: usize, places: &mut Vec<(u32, u32)>) {
         places.extend((0..rows as u32).map(|i| (i, i)));
         places.sort_unstable();
         places.dedup();
-        let mut matrix = BlockMatrix { row_offsets: vec![0; rows + 1], ..BlockMatrix::default() };
-        for (row, column) in &places {
+        self.row_offsets.clear();
+        self.row_offsets.resize(rows + 1, 0);
+        self.columns.clear();
+        self.diagonal.clear();
+        for (row, column) in places {
             if row == column {
-                matrix.diagonal.push(matrix.columns.len());
+                self.diagonal.push(self.columns.len());
             }
-            matrix.columns.push(*column);
-            matrix.row_offsets[*row as usize + 1] = matrix.columns.len();
+            self.columns.push(*column);
+            self.row_offsets[*row as usize + 1] = self.columns.len();
         }
-        matrix.values = vec![[[0.0; 3]; 3]; matrix.columns.len()];
-        matrix
+        self.values.clear();
+        self.values.resize(self.columns.len(), [[0.0; 3]; 3]);
     }
 
     /// Where block `(row, column)`, which the pattern holds, stands in `values`. Cost: logarithmic in the row.

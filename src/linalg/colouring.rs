@@ -11,46 +11,62 @@ pub struct Colouring {
     pub order: Vec<u32>,
     /// Start of each group in `order`; one more entry than groups. The last group is the remainder, possibly empty.
     pub offsets: Vec<usize>,
+    /// Colours that each block has seen, and the colour of each item: capacity only.
+    seen: Vec<u64>,
+    colours: Vec<u8>,
 }
 
-/// Greedy colouring of `count` items in index order: each takes the first colour that none of its `blocks` has seen.
-/// Depends on the topology alone. Cost: one pass over the entries.
-pub fn colour<'a, I>(count: usize, block_count: usize, blocks: impl Fn(usize) -> I) -> Colouring
-where
-    I: Iterator<Item = u32> + Clone + 'a,
-{
-    let mut seen = vec![0u64; block_count];
-    let mut colours = vec![COLOURS_MAX as u8; count];
-    let mut sizes = vec![0usize; COLOURS_MAX + 1];
-    for (item, colour) in colours.iter_mut().enumerate() {
-        let used = blocks(item).fold(0u64, |u, b| u | seen[b as usize]);
-        if used != u64::MAX {
-            let first = (!used).trailing_zeros();
-            *colour = first as u8;
-            for b in blocks(item) {
-                seen[b as usize] |= 1 << first;
+impl Colouring {
+    /// All of `count` items in the remainder.
+    pub fn assign_uncoloured(&mut self, count: usize) {
+        self.order.clear();
+        self.order.extend(0..count as u32);
+        self.offsets.clear();
+        self.offsets.extend([0, count]);
+    }
+
+    /// Greedy colouring of `count` items in index order: each takes the first colour that none of its `blocks` has seen.
+    /// Depends on the topology alone. Cost: one pass over the entries.
+    pub fn assign<'a, I>(&mut self, count: usize, block_count: usize, blocks: impl Fn(usize) -> I)
+    where
+        I: Iterator<Item = u32> + Clone + 'a,
+    {
+        let Colouring { order, offsets, seen, colours } = self;
+        seen.clear();
+        seen.resize(block_count, 0);
+        colours.clear();
+        colours.resize(count, COLOURS_MAX as u8);
+        let mut sizes = [0usize; COLOURS_MAX + 1];
+        for (item, colour) in colours.iter_mut().enumerate() {
+            let used = blocks(item).fold(0u64, |u, b| u | seen[b as usize]);
+            if used != u64::MAX {
+                let first = (!used).trailing_zeros();
+                *colour = first as u8;
+                for b in blocks(item) {
+                    seen[b as usize] |= 1 << first;
+                }
             }
+            sizes[*colour as usize] += 1;
         }
-        sizes[*colour as usize] += 1;
-    }
-    let groups = sizes[..COLOURS_MAX].iter().position(|s| *s == 0).unwrap_or(COLOURS_MAX);
-    let mut offsets = Vec::with_capacity(groups + 2);
-    let mut starts = vec![0usize; COLOURS_MAX + 1];
-    let mut start = 0;
-    for (colour, size) in sizes.iter().enumerate() {
-        starts[colour] = start;
-        if colour < groups || colour == COLOURS_MAX {
-            offsets.push(start);
+        let groups = sizes[..COLOURS_MAX].iter().position(|s| *s == 0).unwrap_or(COLOURS_MAX);
+        offsets.clear();
+        let mut starts = [0usize; COLOURS_MAX + 1];
+        let mut start = 0;
+        for (colour, size) in sizes.iter().enumerate() {
+            starts[colour] = start;
+            if colour < groups || colour == COLOURS_MAX {
+                offsets.push(start);
+            }
+            start += size;
         }
-        start += size;
+        offsets.push(start);
+        order.clear();
+        order.resize(count, 0);
+        for (item, colour) in colours.iter().enumerate() {
+            order[starts[*colour as usize]] = item as u32;
+            starts[*colour as usize] += 1;
+        }
     }
-    offsets.push(start);
-    let mut order = vec![0u32; count];
-    for (item, colour) in colours.iter().enumerate() {
-        order[starts[*colour as usize]] = item as u32;
-        starts[*colour as usize] += 1;
-    }
-    Colouring { order, offsets }
 }
 
 #[cfg(test)]
@@ -69,7 +85,10 @@ mod tests {
             }
         }
         items.extend((0..200).map(|k| [0, k + 1]));
-        let c = colour(items.len(), (width * width) as usize, |i| items[i].iter().copied());
+        let mut c = Colouring::default();
+        c.assign_uncoloured(7);
+        assert_eq!((c.order.len(), &c.offsets[..]), (7, &[0, 7][..]));
+        c.assign(items.len(), (width * width) as usize, |i| items[i].iter().copied());
         let groups = c.offsets.len() - 1;
         for g in 0..groups - 1 {
             let mut seen = vec![false; (width * width) as usize];

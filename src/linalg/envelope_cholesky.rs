@@ -3,7 +3,7 @@
 use super::BlockMatrix;
 use crate::math::{Mat3, Vec3, mat_add, mat_mul, mat_scale, mat_transpose_vec, mat_vec, sub, transpose};
 
-/// Order of elimination and the envelope of the factor: of the pattern alone, made once.
+/// Order of elimination and the envelope of the factor: of the pattern alone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Envelope {
     /// Row of the matrix at each place of the order.
@@ -14,33 +14,47 @@ pub struct Envelope {
     first: Vec<u32>,
     /// Start of each row of the factor; one more entry than rows.
     offsets: Vec<usize>,
+    /// Which rows a visit has seen, and those that it reached: capacity only.
+    seen: Vec<bool>,
+    reached: Vec<u32>,
 }
 
 impl Envelope {
     /// Reverse Cuthill-McKee order [George81, chapter 4], from a node far out in each component. Cost: a few passes
     /// over the pattern.
     pub fn new(matrix: &BlockMatrix) -> Envelope {
+        let mut envelope = Envelope::default();
+        envelope.assign(matrix);
+        envelope
+    }
+
+    /// Makes this the envelope of `matrix` as [`Envelope::new`], in the memory that it has.
+    pub fn assign(&mut self, matrix: &BlockMatrix) {
+        let Envelope { order, place, first, offsets, seen, reached } = self;
         let n = matrix.rows();
-        let mut order: Vec<u32> = Vec::with_capacity(n);
-        let (mut seen, mut reached) = (vec![false; n], Vec::new());
+        order.clear();
+        seen.clear();
+        seen.resize(n, false);
         for start in 0..n {
             if !seen[start] {
-                let far = farthest(matrix, start, &mut seen, &mut reached);
-                let far = farthest(matrix, far, &mut seen, &mut reached);
-                visit(matrix, far, &mut seen, &mut order);
+                let far = farthest(matrix, start, seen, reached);
+                let far = farthest(matrix, far, seen, reached);
+                visit(matrix, far, seen, order);
             }
         }
         order.reverse();
-        let mut place = vec![0; n];
+        place.clear();
+        place.resize(n, 0);
         order.iter().enumerate().for_each(|(p, row)| place[*row as usize] = p as u32);
-        let mut envelope = Envelope { order, place, first: Vec::with_capacity(n), offsets: vec![0] };
+        first.clear();
+        offsets.clear();
+        offsets.push(0);
         for p in 0..n {
-            let columns = row_columns(matrix, envelope.order[p] as usize);
-            let first = columns.iter().map(|c| envelope.place[*c as usize]).fold(p as u32, u32::min);
-            envelope.first.push(first);
-            envelope.offsets.push(envelope.offsets[p] + p + 1 - first as usize);
+            let columns = row_columns(matrix, order[p] as usize);
+            let reach = columns.iter().map(|c| place[*c as usize]).fold(p as u32, u32::min);
+            first.push(reach);
+            offsets.push(offsets[p] + p + 1 - reach as usize);
         }
-        envelope
     }
 
     /// Block products that a factorisation takes.
@@ -83,7 +97,7 @@ fn visit(matrix: &BlockMatrix, start: usize, seen: &mut [bool], order: &mut Vec<
                 order.push(*column);
             }
         }
-        order[from..].sort_by_key(|row| (row_columns(matrix, *row as usize).len(), *row));
+        order[from..].sort_unstable_by_key(|row| (row_columns(matrix, *row as usize).len(), *row));
         next += 1;
     }
 }
@@ -254,6 +268,9 @@ mod tests {
         let mut matrix = grid(4);
         let envelope = Envelope::new(&matrix);
         let fixed: Vec<bool> = (0..17).map(|i| i % 5 == 0).collect();
+        let mut reused = Envelope::new(&grid(8));
+        reused.assign(&matrix);
+        assert!(reused == envelope);
         let exact: Vec<Vec3> = (0..17).map(|i| if fixed[i] { [0.0; 3] } else { [1.0, i as f64, -2.0] }).collect();
         let rhs = |i: usize| if fixed[i] { [7.0; 3] } else { matrix.row_product(i, &exact) };
         let mut x: Vec<Vec3> = (0..17).map(rhs).collect();

@@ -21,7 +21,7 @@ mod single_precision;
 mod sweep_gradient;
 
 pub use block_matrix::BlockMatrix;
-pub use colouring::{Colouring, colour};
+pub use colouring::Colouring;
 pub use conjugate_gradient::{GradientBuffers, GradientEnding, conjugate_gradient};
 pub use envelope_cholesky::{Envelope, EnvelopeCholesky};
 pub use gauss_seidel::gauss_seidel_sweep;

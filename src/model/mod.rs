@@ -31,6 +31,6 @@ pub use report::{BuildError, ContactRecord, StageTimes, StepError, StepReport, W
 pub use settings::{
     Ablation, FailSafe, FilterSettings, FrictionCone, Method, Settings, SolverChoice, StartPolicy, ZoneFriction,
 };
-pub use state::{Drives, HalfSpace, State, StepResult};
+pub use state::{ByBody, Drives, HalfSpace, State, StepResult, write_by_body};
 pub use system::{System, SystemDescription};
 pub use watch::{Phase, Told, Watch};

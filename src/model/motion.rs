@@ -7,16 +7,25 @@ use crate::math::{Vec3, add_scaled, lerp, unit};
 impl Model {
     /// A state with every vertex at rest, poses the identity, half-spaces as described.
     pub fn rest_state(&self) -> State {
+        let mut state = State::default();
+        self.put_at_rest(&mut state);
+        state
+    }
+
+    /// Makes a state that of [`Model::rest_state`], in the room that it has.
+    pub fn put_at_rest(&self, state: &mut State) {
         let half_space = |body: &Body| match body.description.kind {
             Kind::HalfSpace(half_space) => half_space,
             _ => HalfSpace { normal: [0.0, 0.0, 1.0], offset: 0.0 },
         };
-        State {
-            positions: self.rest.clone(),
-            poses: vec![Pose::IDENTITY; self.bodies.len()],
-            half_spaces: self.bodies.iter().map(half_space).collect(),
-            velocities: vec![[0.0; 3]; self.block_count],
-        }
+        let State { positions, poses, half_spaces, velocities } = state;
+        positions.clone_from(&self.rest);
+        poses.clear();
+        poses.resize(self.bodies.len(), Pose::IDENTITY);
+        half_spaces.clear();
+        half_spaces.extend(self.bodies.iter().map(half_space));
+        velocities.clear();
+        velocities.resize(self.block_count, [0.0; 3]);
     }
 
     /// Puts a rigid or posed body at `pose`: pose and vertices, rounded to the body's format.

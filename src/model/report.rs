@@ -113,7 +113,7 @@ pub struct StepReport {
     pub intersections: Option<u32>,
     /// Microseconds by stage.
     pub times: StageTimes,
-    /// Bytes held by memory and scratch.
+    /// Bytes of what is carried to the next step, and of candidates: not of models, metrics and other buffers.
     pub bytes: u64,
 }
 

@@ -14,7 +14,7 @@ pub struct HalfSpace {
 }
 
 /// State at the start of a step; [`crate::implicit_contact::advance`] leaves the end state in it.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct State {
     /// Position of every collision vertex `[m]`. For rigid bodies derived from the pose.
     pub positions: Vec<Vec3>,
@@ -24,6 +24,23 @@ pub struct State {
     pub half_spaces: Vec<HalfSpace>,
     /// Velocity per block `[m/s]`, angular blocks `[rad/s]`: what MODEL bodies start the next step with. Written for all.
     pub velocities: Vec<Vec3>,
+}
+
+impl Clone for State {
+    fn clone(&self) -> State {
+        let mut state = State::default();
+        state.clone_from(self);
+        state
+    }
+
+    /// Keeps the room that is there.
+    fn clone_from(&mut self, from: &State) {
+        let State { positions, poses, half_spaces, velocities } = from;
+        self.positions.clone_from(positions);
+        self.poses.clone_from(poses);
+        self.half_spaces.clone_from(half_spaces);
+        self.velocities.clone_from(velocities);
+    }
 }
 
 /// What the host asks for in a step: unconstrained velocities and scripted targets.
@@ -46,6 +63,25 @@ pub struct Drives {
     pub wind: Vec3,
     /// Targets of springs at the start and the end of the step, by [`super::Body::attachments`] `[m]`.
     pub attachments: Vec<[Vec3; 2]>,
+}
+
+/// Vectors per block of a body, by its key: what is carried from step to step.
+pub type ByBody = Vec<(u64, Vec<Vec3>)>;
+
+/// Writes lists by body, in the room that there is.
+pub fn write_by_body<V: Iterator<Item = Vec3>>(out: &mut ByBody, lists: impl Iterator<Item = (u64, V)>) {
+    let mut written = 0;
+    for (key, vectors) in lists {
+        if out.len() == written {
+            out.push((key, Vec::new()));
+        }
+        let (own, list) = &mut out[written];
+        *own = key;
+        list.clear();
+        list.extend(vectors);
+        written += 1;
+    }
+    out.truncate(written);
 }
 
 /// What a step gives back besides the end state.

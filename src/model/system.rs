@@ -6,7 +6,7 @@ use crate::math::Mat3;
 ///
 /// Rows are 3x3 blocks: for each named body in turn, one per vertex of a deformable body, two (linear, angular) for a
 /// rigid body. Symmetric positive definite; diagonal blocks present.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SystemDescription {
     /// Keys of the bodies, in row order.
     pub bodies: Vec<u64>,

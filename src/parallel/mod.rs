@@ -88,26 +88,43 @@ impl Par<'_> {
 
     /// The vector of `f(i)` for `i` in `0..count`.
     pub fn map_indexed<T: Send>(&self, count: usize, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        let mut out = Vec::new();
+        self.map_indexed_into(&mut out, count, f);
+        out
+    }
+
+    /// The same in the memory of `out`, whose items go.
+    pub fn map_indexed_into<T: Send>(&self, out: &mut Vec<T>, count: usize, f: impl Fn(usize) -> T + Sync) {
         match self.pool() {
-            Some(pool) if count > BLOCK => {
-                pool.install(|| (0..count).into_par_iter().with_min_len(BLOCK).map(&f).collect())
+            Some(pool) if count > BLOCK => pool.install(|| {
+                (0..count).into_par_iter().with_min_len(BLOCK).map(&f).collect_into_vec(out);
+            }),
+            _ => {
+                out.clear();
+                out.extend((0..count).map(f));
             }
-            _ => (0..count).map(f).collect(),
         }
     }
 
     /// What `f(i)` gives for `i` in `0..count` where it gives something, in this order.
     pub fn filter_indexed<T: Send>(&self, count: usize, f: impl Fn(usize) -> Option<T> + Sync) -> Vec<T> {
+        let mut found = Vec::new();
+        self.extend_filtered(&mut found, count, f);
+        found
+    }
+
+    /// Adds to `out` what `f(i)` gives for `i` in `0..count` where it gives something, in this order. Without a pool
+    /// nothing else is gathered.
+    pub fn extend_filtered<T: Send>(&self, out: &mut Vec<T>, count: usize, f: impl Fn(usize) -> Option<T> + Sync) {
         match self.pool() {
-            Some(pool) if count > BLOCK => pool.install(|| {
+            Some(pool) if count > BLOCK => {
                 let blocks = (0..count.div_ceil(BLOCK)).into_par_iter().with_max_len(1);
                 let found = blocks.map(|b| (b * BLOCK..count.min((b + 1) * BLOCK)).filter_map(&f).collect::<Vec<T>>());
-                let mut lists: Vec<Vec<T>> = found.collect();
-                let mut all = Vec::with_capacity(lists.iter().map(Vec::len).sum());
-                lists.iter_mut().for_each(|list| all.append(list));
-                all
-            }),
-            _ => (0..count).filter_map(f).collect(),
+                let mut lists: Vec<Vec<T>> = pool.install(|| found.collect());
+                out.reserve(lists.iter().map(Vec::len).sum());
+                lists.iter_mut().for_each(|list| out.append(list));
+            }
+            _ => out.extend((0..count).filter_map(f)),
         }
     }
 
@@ -209,6 +226,9 @@ mod tests {
             assert_eq!(serial.to_bits(), Par::Pool(&pool).sum(100_003, f).to_bits());
             let squares = Par::Pool(&pool).map_indexed(5000, |i| i * i);
             assert!(squares.iter().enumerate().all(|(i, s)| *s == i * i));
+            let mut reused = squares.clone();
+            Par::Pool(&pool).map_indexed_into(&mut reused, 4000, |i| i * i);
+            assert_eq!(reused, squares[..4000]);
         }
     }
 

@@ -15,7 +15,8 @@ pub fn lap(from: &mut Instant) -> f64 {
     microseconds
 }
 
-/// Sums over the parts of a step.
+/// Sums over the parts of a step. Its room is used again for the next one.
+#[derive(Default)]
 pub struct StepAccount {
     /// State reached.
     pub state: State,
@@ -33,19 +34,17 @@ pub struct StepAccount {
 
 impl StepAccount {
     /// No part done yet, from `state`.
-    pub fn new(model: &Model, state: &State, drives: &Drives) -> StepAccount {
-        StepAccount {
-            state: state.clone(),
-            impulses: vec![[0.0; 3]; model.block_count],
-            end_velocities: drives.velocities.clone(),
-            last: PartEnd::default(),
-            last_dt: 0.0,
-            report: StepReport { certified_fraction: 1.0, ..StepReport::default() },
-        }
+    pub fn begin(&mut self, model: &Model, state: &State, drives: &Drives) {
+        self.state.clone_from(state);
+        self.impulses.clear();
+        self.impulses.resize(model.block_count, [0.0; 3]);
+        self.end_velocities.clone_from(&drives.velocities);
+        self.last_dt = 0.0;
+        self.report = StepReport { certified_fraction: 1.0, ..StepReport::default() };
     }
 
-    /// Takes over a clean part that lasts `share` of the step.
-    pub fn add_part(&mut self, model: &Model, metric: &Metric, part: PartEnd, share: f64, dt: f64) {
+    /// Takes over a clean part that lasts `share` of the step, and leaves the one before in its place.
+    pub fn add_part(&mut self, model: &Model, metric: &Metric, part: &mut PartEnd, share: f64, dt: f64) {
         // A HOST body's parts are shares of one path, those of a MODEL body are steps of their own.
         let weight = |body: &Body| if body.description.dynamics.is_some() { 1.0 } else { share };
         for body in &model.bodies {
@@ -71,7 +70,7 @@ impl StepAccount {
         report.angular_momentum_error += norm(angular_error);
         self.state.clone_from(&part.end);
         self.end_velocities.clone_from(&part.velocities);
-        self.last = part;
+        std::mem::swap(&mut self.last, part);
         self.last_dt = dt;
     }
 
@@ -91,21 +90,19 @@ impl StepAccount {
         report.clone()
     }
 
-    /// What the host pulls besides the end state.
+    /// Writes what the host pulls besides the end state.
     ///
     /// A pinched step ends in no part's velocity: its mean stands for it, so that no host goes on at the unconstrained one.
-    pub fn result(&mut self, model: &Model, start: &State, dt: f64) -> StepResult {
-        let velocities = mean_velocities(model, start, &self.state, dt);
+    pub fn write_result(&mut self, model: &Model, start: &State, dt: f64, result: &mut StepResult) {
+        let StepResult { velocities, end_velocities, impulses, contacts } = result;
+        mean_velocities(model, start, &self.state, dt, velocities);
         if self.report.certified_fraction < 1.0 {
-            self.end_velocities.clone_from(&velocities);
-            self.state.velocities.clone_from(&velocities);
+            self.end_velocities.clone_from(velocities);
+            self.state.velocities.clone_from(velocities);
         }
-        StepResult {
-            velocities,
-            end_velocities: self.end_velocities.clone(),
-            impulses: std::mem::take(&mut self.impulses),
-            contacts: contact_records(model, &self.last, &self.state),
-        }
+        end_velocities.clone_from(&self.end_velocities);
+        std::mem::swap(impulses, &mut self.impulses);
+        contact_records(model, &self.last, &self.state, contacts);
     }
 }
 
@@ -133,8 +130,9 @@ fn start_separation(contact: &Contact, x0: &[Vec3]) -> Vec3 {
 }
 
 /// `(x1 - x0)/dt` per block; angular blocks the mean angular velocity.
-fn mean_velocities(model: &Model, start: &State, end: &State, dt: f64) -> Vec<Vec3> {
-    let mut velocities = vec![[0.0; 3]; model.block_count];
+fn mean_velocities(model: &Model, start: &State, end: &State, dt: f64, velocities: &mut Vec<Vec3>) {
+    velocities.clear();
+    velocities.resize(model.block_count, [0.0; 3]);
     for (index, body) in model.bodies.iter().enumerate() {
         match body.description.kind {
             Kind::Deformable { .. } => {
@@ -150,10 +148,9 @@ fn mean_velocities(model: &Model, start: &State, end: &State, dt: f64) -> Vec<Ve
             Kind::Kinematic { .. } | Kind::HalfSpace(_) => {}
         }
     }
-    velocities
 }
 
-fn contact_records(model: &Model, last: &PartEnd, end: &State) -> Vec<ContactRecord> {
+fn contact_records(model: &Model, last: &PartEnd, end: &State, records: &mut Vec<ContactRecord>) {
     let record = |SolvedContact { contact, solved, .. }: &SolvedContact| ContactRecord {
         bodies: contact.pair.bodies(model).map(|b| model.bodies[b].description.key),
         kind: contact.pair.kind as u32,
@@ -170,5 +167,6 @@ fn contact_records(model: &Model, last: &PartEnd, end: &State) -> Vec<ContactRec
         },
         key: contact.pair.key(model, contact.ordinal).number(),
     };
-    last.contacts.iter().map(record).collect()
+    records.clear();
+    records.extend(last.contacts.iter().map(record));
 }

@@ -1,7 +1,7 @@
 //! The last stage: state, memory and result, all at once.
 
 use super::account::{StepAccount, lap};
-use super::carried::{Carried, Certified};
+use super::carried::Carried;
 use super::whole::Step;
 use crate::contact_search::{BodyFilter, CandidateSearch, Passing, intersections_with};
 use std::time::Instant;
@@ -17,15 +17,17 @@ pub(super) fn commit(
 ) {
     let mut clock = Instant::now();
     let model = step.model;
-    *step.result = account.result(model, step.state, step.dt);
+    account.write_result(model, step.state, step.dt, step.result);
     std::mem::swap(step.state, &mut account.state);
     let state = &*step.state;
-    carried.certified = passing.is_empty().then(|| Certified {
-        topology: model.topology_hash,
-        filter: filter.fingerprint(),
-        positions: state.positions.clone(),
-        half_spaces: state.half_spaces.clone(),
-    });
+    if passing.is_empty() {
+        let certified = carried.certified.get_or_insert_default();
+        (certified.topology, certified.filter) = (model.topology_hash, filter.fingerprint());
+        certified.positions.clone_from(&state.positions);
+        certified.half_spaces.clone_from(&state.half_spaces);
+    } else {
+        carried.certified = None;
+    }
     if step.settings.certify {
         let found = intersections_with(search, model, filter, state, step.par).witnesses.len();
         account.report.intersections = Some(found as u32);

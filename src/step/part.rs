@@ -72,3 +72,13 @@ pub struct PartEnd {
     /// Pairs that came too close.
     pub hits: Vec<Hit>,
 }
+
+impl PartEnd {
+    /// An end of nothing.
+    pub(super) fn clear(&mut self) {
+        self.velocities.clear();
+        self.block_impulses.clear();
+        self.contacts.clear();
+        self.hits.clear();
+    }
+}

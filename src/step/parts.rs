@@ -7,8 +7,8 @@ use super::part::{PartEnd, PartStart};
 use super::whole::Step;
 use crate::contact_search::{BodyFilter, CandidateSearch, Hit, Passing};
 use crate::dynamics::Accelerations;
-use crate::fail_safe::parts_of_step;
-use crate::model::{Model, Phase, Segment, Settings, StartPolicy, StepError, StepReport};
+use crate::fail_safe::{Part, parts_of_step};
+use crate::model::{Model, Phase, Segment, Settings, StartPolicy, State, StepError, StepReport};
 use std::time::Instant;
 
 /// How often the pairs of a pinch pass one by one before their bodies pass as a whole.
@@ -19,14 +19,15 @@ const PARTS_MAX: u32 = 256;
 
 /// What a method does with one part of a step.
 pub trait PartMethod {
-    /// Responds to the contacts of a part; the end is clean unless the method could not make it so. Counts, residuals and
-    /// times are added to the report. Errors: cancelled.
+    /// Responds to the contacts of a part; the end, written over, is clean unless the method could not make it so. Counts,
+    /// residuals and times are added to the report. Errors: cancelled.
     fn respond(
         &mut self,
         part: &PartStart,
         search: &mut CandidateSearch,
         report: &mut StepReport,
-    ) -> Result<PartEnd, StepError>;
+        end: &mut PartEnd,
+    ) -> Result<(), StepError>;
 
     /// Halvings of a part that did not come clean, before the fail-safes.
     fn halvings_max(&self, settings: &Settings) -> u32;
@@ -40,6 +41,17 @@ pub trait PartMethod {
     fn keep(&mut self, model: &Model, part: &PartEnd, dt: f64, by_itself: bool);
 }
 
+/// Buffers over the parts of a step: capacity only.
+#[derive(Default)]
+pub(super) struct PartBuffers {
+    /// Parts still to do, the next one last.
+    left: Vec<Part>,
+    /// Where the present part starts.
+    here: State,
+    /// Where it ends.
+    end: PartEnd,
+}
+
 /// Makes all parts of a step; the pairs that leave no room if it was pinched. Errors: cancelled, and what the dynamics
 /// of a part refuse.
 pub(super) fn run_parts(
@@ -50,17 +62,22 @@ pub(super) fn run_parts(
     accelerations: &Accelerations,
     passing: &mut Passing,
     search: &mut CandidateSearch,
+    buffers: &mut PartBuffers,
     account: &mut StepAccount,
 ) -> Result<Option<Vec<Hit>>, StepError> {
     let Step { model, settings, par, watch, .. } = *step;
     let undivided = step.segment();
-    let mut parts = parts_of_step(model, step.state, driven.drives(step.drives), settings, step.dt);
+    let PartBuffers { left: parts, here, end } = buffers;
+    parts_of_step(model, step.state, driven.drives(step.drives), settings, step.dt, parts);
     let (mut passes, mut again) = (0, Driven::default());
+    // An undivided step needs the room of one end alone.
+    std::mem::swap(end, &mut account.last);
+    account.last.clear();
     while let Some(part) = parts.pop() {
         let share = part.to - part.from;
-        let here = account.state.clone();
+        here.clone_from(&account.state);
         let dt = share * step.dt;
-        let pushed = Segment { start: &here, from: part.from, to: part.to, dt, ..undivided };
+        let pushed = Segment { start: here, from: part.from, to: part.to, dt, ..undivided };
         // MODEL bodies are assembled again for a part of the step, HOST bodies go a part of their path.
         let mut clock = Instant::now();
         let anew = share < 1.0 && has_own_dynamics(model);
@@ -72,9 +89,9 @@ pub(super) fn run_parts(
         let start = PartStart { segment, metric: &driven.metric, filter, passing, settings, par, watch };
         account.report.not_converged |= !driven.converged();
         account.report.times.dynamics += lap(&mut clock);
-        let end = method.respond(&start, search, &mut account.report)?;
+        method.respond(&start, search, &mut account.report, end)?;
         if end.hits.is_empty() {
-            method.keep(model, &end, dt, true);
+            method.keep(model, end, dt, true);
             account.add_part(model, start.metric, end, share, dt);
             continue;
         }
@@ -87,13 +104,13 @@ pub(super) fn run_parts(
         }
         clock = Instant::now();
         watch.ask(Phase::FailSafe, part.from)?;
-        let outcome = fall_back(&start, end, method.has_zones(settings), search);
+        let outcome = fall_back(&start, std::mem::take(end), method.has_zones(settings), search);
         account.report.times.fail_safe += lap(&mut clock);
         match outcome {
-            FallBack::Resolved { part: end, projected, rigid, held_vertices, momentum_taken } => {
+            FallBack::Resolved { part: mut end, projected, rigid, held_vertices, momentum_taken } => {
                 method.keep(model, &end, dt, false);
                 account.add_fail_safe([projected, rigid, held_vertices], share, momentum_taken);
-                account.add_part(model, start.metric, *end, share, dt);
+                account.add_part(model, start.metric, &mut end, share, dt);
             }
             FallBack::Pinched { share: within, state: stopped, hits } => {
                 let passes_on = settings.start_policy == StartPolicy::Pass;

@@ -6,7 +6,7 @@ use super::commit::commit;
 use super::driven::Driven;
 use super::fall_back::witnesses;
 use super::inputs::check_inputs;
-use super::parts::{PartMethod, run_parts};
+use super::parts::{PartBuffers, PartMethod, run_parts};
 use crate::contact_search::{BodyFilter, CandidateSearch, Hit};
 use crate::model::{Drives, Model, Phase, Segment, Settings, State, StepError, StepReport, StepResult, Watch};
 use crate::parallel::Par;
@@ -46,8 +46,14 @@ impl Step<'_> {
 pub struct Scratch {
     /// Broad phase and candidates.
     candidates: CandidateSearch,
-    /// Dynamics and metric; taken out while a step runs.
+    /// Dynamics and metric.
     driven: Driven,
+    /// Which bodies may touch.
+    filter: BodyFilter,
+    /// Parts of the step.
+    parts: PartBuffers,
+    /// What they add up to; taken out while a step is made.
+    account: StepAccount,
 }
 
 /// A step that is made, and committed; pinched or not.
@@ -74,32 +80,32 @@ pub fn make_step(
     check_inputs(step)?;
     // (2) A, b and unconstrained velocities of MODEL bodies, HOST bodies bring theirs; the metric.
     step.watch.ask(Phase::Dynamics, 0.0)?;
-    let mut driven = std::mem::take(&mut scratch.driven);
+    let Scratch { candidates: search, driven, filter, parts, account } = scratch;
     driven.assign(&step.segment(), &carried.accelerations, step.par)?;
-    let filter = BodyFilter::new(step.model);
-    let mut account = StepAccount::new(step.model, step.state, driven.drives(step.drives));
+    filter.assign(step.model);
+    let mut account = std::mem::take(account);
+    account.begin(step.model, step.state, driven.drives(step.drives));
     account.report.times.dynamics += lap(&mut clock);
     // (3) The start state: certified, refused, or tangled.
     step.watch.ask(Phase::Start, 0.0)?;
-    let search = &mut scratch.candidates;
-    let mut passing = start_state(step, &filter, carried, &mut account.report, search)?;
+    let mut passing = start_state(step, filter, carried, &mut account.report, search)?;
     account.report.times.certificate += lap(&mut clock);
     // The method's own stages and the fail-safes, part by part.
     let accelerations = &carried.accelerations;
-    let pinch = run_parts(method, step, &filter, &driven, accelerations, &mut passing, search, &mut account)?;
+    let pinch = run_parts(method, step, filter, driven, accelerations, &mut passing, search, parts, &mut account)?;
     // Commit.
     driven.keep_accelerations(&step.segment(), &mut carried.accelerations);
-    scratch.driven = driven;
-    commit(step, &filter, carried, &passing, search, &mut account);
+    commit(step, filter, carried, &passing, search, &mut account);
     Ok(Made { account, pinch, began })
 }
 
 impl Made {
     /// The report, or `Pinched` with witnesses of the pairs that left no room; `held` are the bytes of a method's memory.
-    pub fn answer(mut self, step: &Step, held: usize, scratch: &Scratch) -> Result<StepReport, StepError> {
+    pub fn answer(mut self, step: &Step, held: usize, scratch: &mut Scratch) -> Result<StepReport, StepError> {
         let mut report = self.account.finished_report();
         report.bytes = (held + scratch.candidates.bytes()) as u64;
         report.times.total = lap(&mut self.began);
+        scratch.account = self.account;
         match self.pinch {
             None => Ok(report),
             Some(hits) => {

@@ -28,13 +28,16 @@ impl PartMethod for Filter {
         part: &PartStart,
         search: &mut CandidateSearch,
         report: &mut StepReport,
-    ) -> Result<PartEnd, StepError> {
+        end: &mut PartEnd,
+    ) -> Result<(), StepError> {
         if part.settings.filter.two_pass {
-            return filter_in_two_passes(part, search, report);
+            *end = filter_in_two_passes(part, search, report)?;
+            return Ok(());
         }
         let mut motion = FilteredMotion::new(&part.segment, part.metric);
         let hits = filter_once(part, &mut motion, search, report)?;
-        Ok(motion.into_part(hits))
+        *end = motion.into_part(hits);
+        Ok(())
     }
 
     fn halvings_max(&self, _: &Settings) -> u32 {
@@ -57,7 +60,8 @@ pub(super) fn filter_once(
 ) -> Result<Vec<Hit>, StepError> {
     let mut clock = Instant::now();
     // (3) Repulsions.
-    let near = part.sweep().near(&motion.end, 1.0, search);
+    let mut near = Vec::new();
+    part.sweep().near(&motion.end, 1.0, search, &mut near);
     report.times.search += lap(&mut clock);
     repel(motion, &near, part);
     report.times.solve += lap(&mut clock);

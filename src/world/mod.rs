@@ -41,7 +41,7 @@ pub use system::SymmetrySlack;
 
 use crate::implicit_contact::{Memory, Scratch};
 use crate::math::Vec3;
-use crate::model::{ContactRecord, Drives, Material, Model, State, StepResult, Witness};
+use crate::model::{Drives, Material, Model, State, StepResult, Witness};
 use crate::velocity_filter;
 use ids::{IdKind, Slots};
 
@@ -62,7 +62,6 @@ pub struct World {
     memory: Memory,
     scratch: Scratch,
     filter_scratch: velocity_filter::Scratch,
-    contacts: Vec<ContactRecord>,
     witnesses: Vec<Witness>,
 }
 
@@ -91,7 +90,6 @@ impl World {
             memory: Memory::default(),
             scratch: Scratch::default(),
             filter_scratch: velocity_filter::Scratch::default(),
-            contacts: Vec::new(),
             witnesses: Vec::new(),
         }
     }

@@ -141,7 +141,7 @@ impl World {
 
     /// Contacts of the last step in stable order; bodies by key, see [`World::id_of_key`].
     pub fn contacts(&self) -> &[ContactRecord] {
-        &self.contacts
+        &self.result.contacts
     }
 
     /// Witnesses of the last check, or of the last step that was refused or pinched.

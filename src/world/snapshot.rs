@@ -209,7 +209,7 @@ impl World {
         self.overrides.save(out);
         save_slots(&self.systems, out);
         self.memory.save(out);
-        self.contacts.save(out);
+        self.result.contacts.save(out);
         self.gravity.save(out);
         self.wind.save(out);
     }
@@ -236,11 +236,10 @@ impl World {
             drives: Default::default(),
             gravity,
             wind,
-            result: StepResult::default(),
+            result: StepResult { contacts, ..StepResult::default() },
             memory,
             scratch: Scratch::default(),
             filter_scratch: Default::default(),
-            contacts,
             witnesses: Vec::new(),
         })
     }
@@ -330,7 +329,7 @@ impl World {
         self.overrides.save(&mut hash);
         hash_values(&self.systems, &mut hash);
         self.memory.save(&mut hash);
-        self.contacts.save(&mut hash);
+        self.result.contacts.save(&mut hash);
         self.gravity.save(&mut hash);
         self.wind.save(&mut hash);
         hash.value()

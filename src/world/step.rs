@@ -117,21 +117,29 @@ impl World {
                 drives.target_half_spaces[index] = plane;
             }
         }
-        drives.systems.clear();
         let patterns = self.model.systems.iter();
+        let mut given = 0;
         for ((id, system), description) in self.systems.iter().zip(patterns) {
             if system.values.is_empty() {
                 let message = "a system has no values: push them before the step";
                 return Err(WorldError::new(Fault::InvalidArgument, message).object(id));
             }
-            drives.systems.push(System { description: description.clone(), values: system.values.clone() });
+            match drives.systems.get_mut(given).filter(|known| known.description == *description) {
+                Some(known) => known.values.clone_from(&system.values),
+                None => {
+                    drives.systems.truncate(given);
+                    drives.systems.push(System { description: description.clone(), values: system.values.clone() });
+                }
+            }
+            given += 1;
         }
+        drives.systems.truncate(given);
         Ok(())
     }
 
     /// Writes the start state of every body into the arrays of the model.
     pub(super) fn gather_state(&mut self) {
-        self.state = self.model.rest_state();
+        self.model.put_at_rest(&mut self.state);
         for (index, body) in self.model.bodies.iter().enumerate() {
             let id = self.bodies.id_of_key(body.description.key);
             if let Ok(kept) = self.bodies.get(id) {
@@ -143,21 +151,19 @@ impl World {
 
     /// Sweeps bodies from where the last step left them to starts that were pushed without a teleport.
     fn check_pushed_starts(&mut self, par: Par) -> Result<(), WorldError> {
+        if self.bodies.iter().all(|(_, body)| body.certified.is_none()) {
+            return Ok(());
+        }
         let mut before = self.state.clone();
-        let mut moved = false;
         for (index, body) in self.model.bodies.iter().enumerate() {
             let kept = self.bodies.get(self.bodies.id_of_key(body.description.key))?;
             if let Some(certified) = &kept.certified {
-                moved = true;
                 if !certified.positions.is_empty() {
                     before.positions[body.vertices.clone()].copy_from_slice(&certified.positions);
                 }
                 before.poses[index] = certified.pose;
                 before.half_spaces[index] = certified.half_space;
             }
-        }
-        if !moved {
-            return Ok(());
         }
         let filter = BodyFilter::new(&self.model);
         let mut hits = swept_free(&self.model, &filter, &before, &self.state, par);
@@ -205,7 +211,6 @@ impl World {
                 kept.extend_from_slice(all.get(body.blocks.clone()).unwrap_or_default());
             }
         }
-        self.contacts.clone_from(&self.result.contacts);
     }
 
     fn build_failure(&self, fault: Fault, error: &BuildError) -> WorldError {

@@ -32,7 +32,8 @@ fn setting(seed: u64) -> Setting {
     let x0 = &world.state.positions;
     let found = search.update(&world.model, &filter, x0, x0, 1.0, Par::Serial);
     let passing = Passing::default();
-    let contacts = near_contacts(&world.model, &filter, &passing, found, &world.state, &world.state, 1.0, Par::Serial);
+    let (start, mut contacts) = (&world.state, Vec::new());
+    near_contacts(&world.model, &filter, &passing, found, start, start, 1.0, &mut contacts, Par::Serial);
     let metric = Metric::new(&world.model, &world.state, &world.drives).unwrap();
     Setting { contacts, metric, world }
 }

@@ -72,7 +72,8 @@ fn every_near_pair_is_covered_by_a_contact_and_every_contact_is_near() {
         let mut search = CandidateSearch::default();
         let candidates = search.update(model, &filter, x0, &end.positions, 1.0, Par::Serial);
         let passing = Passing::default();
-        let contacts = near_contacts(model, &filter, &passing, candidates, &world.state, &end, 1.0, Par::Serial);
+        let mut contacts = Vec::new();
+        near_contacts(model, &filter, &passing, candidates, &world.state, &end, 1.0, &mut contacts, Par::Serial);
         let mesh: Vec<&Contact> = contacts.iter().filter(|c| c.pair.kind != PairKind::VertexHalfSpace).collect();
         let mut near = 0;
         for pair in all_pairs(model, &filter) {
@@ -128,7 +129,9 @@ fn contacts_of_a_tip_at(x: f64, y: f64) -> Vec<Contact> {
     let x0 = &world.state.positions;
     let candidates = search.update(&world.model, &filter, x0, x0, 1.0, Par::Serial);
     let (start, passing) = (&world.state, Passing::default());
-    near_contacts(&world.model, &filter, &passing, candidates, start, start, 1.0, Par::Serial)
+    let mut contacts = Vec::new();
+    near_contacts(&world.model, &filter, &passing, candidates, start, start, 1.0, &mut contacts, Par::Serial);
+    contacts
 }
 
 #[test]
@@ -264,9 +267,10 @@ fn widened_candidates_miss_nothing() {
             let found = |search: &mut CandidateSearch| {
                 let x = (&world.state.positions, &next.positions);
                 let passing = Passing::default();
-                let candidates = search.update(model, &filter, x.0, x.1, 2.0, Par::Serial);
-                let near = near_contacts(model, &filter, &passing, candidates, &world.state, &next, 2.0, Par::Serial);
-                (swept_hits(model, &filter, &passing, candidates, &world.state, &next, Par::Serial), near)
+                let mut found = search.update(model, &filter, x.0, x.1, 2.0, Par::Serial);
+                let (start, mut near) = (&world.state, Vec::new());
+                near_contacts(model, &filter, &passing, found.again(), start, &next, 2.0, &mut near, Par::Serial);
+                (swept_hits(model, &filter, &passing, found, start, &next, Par::Serial), near)
             };
             let (kept, fresh) = (found(&mut search), found(&mut CandidateSearch::default()));
             assert!(kept == fresh, "seed {seed} round {round}: {} {}", kept.0.len(), fresh.0.len());

@@ -2,7 +2,8 @@
 
 use crate::random::Random;
 use crate::scenes::scenes;
-use signorini::detection::{Candidates, Motion, brute_force, screening};
+use signorini::detection::screening::{self, Buffers};
+use signorini::detection::{Candidates, Motion, brute_force};
 use signorini::geometry::{edge_edge, point_triangle};
 use signorini::math::{Vec3, lerp};
 use signorini::parallel::{Par, Pool};
@@ -34,7 +35,7 @@ fn distance(x: [Vec3; 4], vertex_face: bool) -> f64 {
 #[test]
 fn no_near_or_approaching_pair_is_ruled_out_and_most_others_are() {
     let pool = Pool::new(2).unwrap();
-    let mut r = Random::new(71);
+    let (mut r, mut buffers) = (Random::new(71), Buffers::default());
     let (mut far, mut far_open, mut near_total, mut approaching_total) = (0, 0, 0, 0);
     for scene in scenes() {
         let p = scene.primitives();
@@ -47,11 +48,14 @@ fn no_near_or_approaching_pair_is_ruled_out_and_most_others_are() {
             let mut candidates = brute_force::candidates(&p, &motion, &|_, _| true);
             candidates.vertex_face.truncate(4000);
             candidates.edge_edge.truncate(4000);
-            let near = screening::near(&scene.x0, &p, &candidates, &reach, Par::Serial);
-            assert_eq!(near, screening::near(&scene.x0, &p, &candidates, &reach, Par::Pool(&pool)));
             let (x0, x1) = (&scene.x0, &scene.x1);
-            let approaching = screening::approaching(x0, x1, &p, &candidates, &reach, Par::Serial);
-            assert_eq!(approaching, screening::approaching(x0, x1, &p, &candidates, &reach, Par::Pool(&pool)));
+            // The buffers of the scene before, and none.
+            let [near, again] = [(Par::Serial, &mut buffers), (Par::Pool(&pool), &mut Buffers::default())]
+                .map(|(par, buffers)| screening::near(x0, &p, &candidates, &reach, buffers, par).to_vec());
+            assert_eq!(near, again);
+            let [approaching, again] = [(Par::Serial, &mut buffers), (Par::Pool(&pool), &mut Buffers::default())]
+                .map(|(par, buffers)| screening::approaching(x0, x1, &p, &candidates, &reach, buffers, par).to_vec());
+            assert_eq!(approaching, again);
             assert!(near.is_sorted() && approaching.is_sorted());
             for i in 0..candidates.vertex_face.len() + candidates.edge_edge.len() {
                 let (v, vertex_face) = vertices(&scene, &candidates, i);
@@ -88,7 +92,9 @@ fn what_is_not_finite_stays_open() {
         vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 9.0], [1.0, 0.0, 9.0], [0.0, 1.0, 9.0]];
     let candidates = Candidates { vertex_face: vec![[0, 1]], edge_edge: vec![[0, 1]], ..Candidates::default() };
     let reach = [0.1; 6];
-    let both = |x1: &[Vec3]| screening::approaching(&x, x1, &p, &candidates, &reach, Par::Serial);
+    let mut buffers = Buffers::default();
+    let mut both =
+        |x1: &[Vec3]| screening::approaching(&x, x1, &p, &candidates, &reach, &mut buffers, Par::Serial).to_vec();
     assert!(both(&x).is_empty());
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for vertex in [0, 3, 4] {
@@ -97,7 +103,9 @@ fn what_is_not_finite_stays_open() {
                 end[vertex][k] = bad;
                 let expected = [0, 1];
                 assert_eq!(both(&end), expected, "{vertex} {k} {bad}");
-                assert_eq!(screening::near(&end, &p, &candidates, &reach, Par::Serial), expected);
+                let near =
+                    screening::near(&end, &p, &candidates, &reach, &mut Buffers::default(), Par::Serial).to_vec();
+                assert_eq!(near, expected);
             }
         }
     }

@@ -5,6 +5,7 @@ use super::solver_problems::{Made, folded_sheet, mixed, rigid_stack, tetrahedra,
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SupportedConeT};
 use nalgebra::{DMatrix, DVector};
+use signorini::implicit_contact::{SolverScratch, solve};
 use signorini::math::{Vec3, dot, norm};
 use signorini::model::{FrictionCone, Settings, SolverChoice};
 use signorini::parallel::{Par, Pool};
@@ -321,6 +322,25 @@ fn lumped_and_rigid_blocks_keep_momentum_at_any_number_of_iterations() {
                 let m = made.matrix.diagonal_block(b)[0][0];
                 let difference: Vec3 = std::array::from_fn(|c| m * dv[b][c] - load[b][c]);
                 assert!(norm(difference) <= 1e-13 * scale);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_scratch_that_other_problems_have_used_changes_no_bit() {
+    let mut scratch = SolverScratch::default();
+    let choices = [SolverChoice::Automatic, SolverChoice::AcceleratedRelaxation, SolverChoice::AugmentedLagrangian];
+    // Each problem after a larger one and after a smaller one.
+    let forth = families();
+    for (name, made) in forth.iter().chain(forth.iter().rev()) {
+        for solver in choices {
+            for settings in
+                [Settings { solver, ..Settings::default() }, Settings { iterations_max: 3000, ..tight(solver) }]
+            {
+                let (mut p, mut dv) = made.zeros();
+                let report = solve(&made.view(), &mut p, &mut dv, &settings, &mut scratch, Par::Serial);
+                assert!((p, dv, report) == made.solve(&settings), "{name}, {solver:?}");
             }
         }
     }
