@@ -11,7 +11,7 @@ use crate::parallel::Par;
 
 /// Residual of the unconstrained solve, relative to that of standing at the old velocity, in the norm of the inverse
 /// diagonal. What it leaves of the velocity change is well below what the contact solver's tolerance does.
-pub const TOLERANCE: f64 = 1e-4;
+pub const TOLERANCE: f64 = 1e-3;
 
 /// Steps of conjugate gradients at most, per node and in all: beyond, the velocity reached is used and reported.
 const STEPS_PER_NODE: usize = 3;
