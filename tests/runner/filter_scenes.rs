@@ -58,8 +58,8 @@ fn cloth_slides_into_the_funnel_unstretched() {
 #[test]
 fn rigid_zones_stick_where_projections_flow() {
     let folder = Folder::new("zones-alone");
-    // From step 299 on rigid zones pinch.
-    let steps = if all() { "280" } else { "120" };
+    // From step 176 on rigid zones pinch, sooner or later by how the cloth happens to fold.
+    let steps = if all() { "170" } else { "120" };
     let [rigid, inelastic, unilateral] = ["rigid_zone", "inelastic_projection", "unilateral_projection"].map(|name| {
         let line = run(&folder, "funnel_coarse", &["--passes", "0", "--fail-safe", name, "--steps", steps]);
         assert!(line["failsafes"].as_u64() > Some(10), "no zones: {line}");
