@@ -61,26 +61,19 @@ impl Translations {
         self.inverse_masses.iter_mut().for_each(|m| *m = inverse(m).unwrap_or(ZERO_MATRIX));
     }
 
-    /// The translation of each component that makes `product`, which is `A dv`, and the impulses sum up to the same
+    /// Writes the translation of each component that makes `product`, which is `A dv`, and the impulses sum up to the same
     /// `[m/s]`. Cost: a pass over the blocks.
     ///
     /// It is the correction that brings `dv` closest to the solution of `A dv = impulses` in the norm of A. Stiffness
     /// does not feel a translation of the whole, so that what the masses gain is then what contacts gave, to rounding.
-    pub fn missing(&self, impulses: &[Vec3], product: &[Vec3]) -> Vec<Vec3> {
-        let mut missing = Vec::new();
-        self.missing_into(impulses, product, &mut missing);
-        missing
-    }
-
-    /// The same in the memory of `missing`.
-    pub fn missing_into(&self, impulses: &[Vec3], product: &[Vec3], missing: &mut Vec<Vec3>) {
-        missing.clear();
-        missing.resize(self.inverse_masses.len(), [0.0; 3]);
+    pub fn missing(&self, impulses: &[Vec3], product: &[Vec3], out: &mut Vec<Vec3>) {
+        out.clear();
+        out.resize(self.inverse_masses.len(), [0.0; 3]);
         for (row, component) in self.component.iter().enumerate().filter(|(_, c)| **c != NONE) {
-            let sum = &mut missing[*component as usize];
+            let sum = &mut out[*component as usize];
             *sum = add(*sum, sub(impulses[row], product[row]));
         }
-        missing.iter_mut().zip(&self.inverse_masses).for_each(|(r, m)| *r = mat_vec(m, *r));
+        out.iter_mut().zip(&self.inverse_masses).for_each(|(r, m)| *r = mat_vec(m, *r));
     }
 
     /// The component that block `b` belongs to.
@@ -149,7 +142,9 @@ mod tests {
         let mut dv = vec![[0.1, 0.2, 0.3], [0.0; 3], [9.0; 3], [-0.4, 0.0, 0.0], [1.0, 1.0, 1.0]];
         let balance = |impulses: &[Vec3], dv: &mut [Vec3]| {
             let product: Vec<Vec3> = (0..5).map(|row| a.row_product(row, dv)).collect();
-            modes.translate(&modes.missing(impulses, &product), dv)
+            let mut missing = Vec::new();
+            modes.missing(impulses, &product, &mut missing);
+            modes.translate(&missing, dv)
         };
         let largest = balance(&impulses, &mut dv);
         // The free chain has masses 2 and 3; its springs cancel.
@@ -166,8 +161,9 @@ mod tests {
         let a = chains();
         let mut modes = Translations::new(&a, &[true, true, true, false, true]);
         modes.update(&a);
-        let mut dv = vec![[0.0; 3]; 5];
-        modes.translate(&modes.missing(&[[7.0, 0.0, 0.0]; 5], &[[0.0; 3]; 5]), &mut dv);
+        let (mut dv, mut missing) = (vec![[0.0; 3]; 5], Vec::new());
+        modes.missing(&[[7.0, 0.0, 0.0]; 5], &[[0.0; 3]; 5], &mut missing);
+        modes.translate(&missing, &mut dv);
         assert_eq!(dv[3], [0.0; 3]);
         assert!((dv[0][0] - 1.0).abs() < 1e-15, "7 over its own diagonal block");
     }

@@ -144,6 +144,7 @@ impl Borders {
 mod tests {
     use super::super::pair::Pair;
     use super::*;
+    use crate::math::random::Random;
 
     /// Vertices that count on each side, sorted.
     fn sides(c: &Contact) -> [Vec<u32>; 2] {
@@ -188,11 +189,8 @@ mod tests {
 
     #[test]
     fn same_contacts_as_by_brute_force() {
-        let mut state = 1_u64;
-        let mut pick = |n: u64| {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 33) % n
-        };
+        let mut random = Random(1);
+        let mut pick = |n: u64| random.below(n);
         let (mut shorter, mut borders) = (0, Borders::default());
         for round in 0..300 {
             // Few vertices, so that borders are shared and nearly every slot of the table is asked for.

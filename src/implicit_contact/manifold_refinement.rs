@@ -309,7 +309,7 @@ fn solve_balanced(
     for _ in 0..BALANCES_MAX {
         let report = solve(problem, impulses, dv, &settings, scratch, par);
         let (product, given) = scratch.balance();
-        metric.translations.missing_into(given, product, shifts);
+        metric.translations.missing(given, product, shifts);
         let moved = metric.translations.translate(shifts, dv);
         // A row weighs both its sides with one at most.
         let off = 2.0 * moved / problem.velocity_scale;

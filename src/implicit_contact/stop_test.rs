@@ -98,7 +98,7 @@ fn balanced(task: &Task, at: &Iterate, buffers: &mut MeasureBuffers, work: &mut 
     let MeasureBuffers { product, contact, balanced, translations: missing, .. } = buffers;
     balanced.clone_from(&at.dv);
     let Some(translations) = task.problem.translations else { return true };
-    translations.missing_into(contact, product, missing);
+    translations.missing(contact, product, missing);
     let moved = translations.translate(missing, balanced);
     let tolerance = task.settings.contact_tolerance;
     // A row weighs both its sides with one at most.

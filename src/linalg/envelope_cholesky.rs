@@ -203,6 +203,7 @@ fn inverse_factor(m: &Mat3) -> Option<Mat3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::random::Random;
     use crate::math::{IDENTITY, norm, outer};
 
     /// A grid of nodes with springs of random directions, shuffled, and a lone node at the end.
@@ -210,11 +211,8 @@ mod tests {
         let count = n * n + 1;
         let shuffled = |i: usize| (i * 7 + 3) % (n * n);
         let mut dense = vec![vec![[[0.0; 3]; 3]; count]; count];
-        let mut seed = 5u64;
-        let mut next = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
+        let mut random = Random(5);
+        let mut next = || random.signed();
         for row in dense.iter_mut().enumerate() {
             row.1[row.0] = mat_scale(1e-3, &IDENTITY);
         }

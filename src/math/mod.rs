@@ -10,6 +10,8 @@
 mod integer;
 mod integer_polynomial;
 pub mod predicates;
+#[cfg(test)]
+pub(crate) mod random;
 pub mod simd;
 mod singular_values;
 mod vector;

@@ -106,6 +106,7 @@ fn closest_across(n: Vec3, wanted: Vec3, other: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::random::Random;
     use crate::math::{ZERO_MATRIX, mat_add, mat_scale};
 
     fn largest_difference(a: &Mat3, b: &Mat3) -> f64 {
@@ -128,11 +129,8 @@ mod tests {
 
     #[test]
     fn rotations_times_signed_values_give_the_matrix_back() {
-        let mut seed = 1u64;
-        let mut next = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
+        let mut random = Random(1);
+        let mut next = || random.signed();
         for case in 0..400 {
             let mut f: Mat3 = std::array::from_fn(|_| std::array::from_fn(|_| next()));
             if case % 4 == 1 {

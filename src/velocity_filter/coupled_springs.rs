@@ -79,7 +79,9 @@ pub fn settle_coupled(stage: &mut StageRows, limits: &[f64], metric: &Metric, pa
         }
         dv.iter_mut().zip(&direction).for_each(|(v, d)| *v = add_scaled(*v, way, *d));
     }
-    metric.translations.translate(&metric.translations.missing(&balance.0, &balance.1), &mut dv);
+    let mut missing = Vec::new();
+    metric.translations.missing(&balance.0, &balance.1, &mut missing);
+    metric.translations.translate(&missing, &mut dv);
     let Springs { impulses, sticks, .. } = springs;
     stage.respond(impulses, sticks, dv);
 }

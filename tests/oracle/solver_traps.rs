@@ -81,7 +81,9 @@ fn rows_hold_once_momentum_is_balanced() {
                 made.rows.scatter(row, made.rows.impulse(row, *p), &mut impulses);
             }
             let product: Vec<_> = (0..dv.len()).map(|b| made.matrix.row_product(b, &dv)).collect();
-            translations.translate(&translations.missing(&impulses, &product), &mut dv);
+            let mut missing = Vec::new();
+            translations.missing(&impulses, &product, &mut missing);
+            translations.translate(&missing, &mut dv);
             let row = |i: usize| {
                 let seen = made.rows.relative_velocity(i, &dv);
                 let gap = dot(made.rows.frames[i][0], seen) - made.rows.normal_targets[i];
