@@ -2,7 +2,9 @@
 
 use super::distinct::Borders;
 use super::pair::BodyFilter;
+use super::vicinity::Vicinity;
 use crate::detection::intersection::{Intersection, find_with};
+use crate::detection::screening::Lists;
 use crate::detection::{BroadPhase, Candidates, Primitives, Stars, screening};
 use crate::geometry::Aabb;
 use crate::math::{Vec3, is_finite};
@@ -15,6 +17,8 @@ use crate::parallel::Par;
 pub struct CandidateSearch {
     meshes: Option<Meshes>,
     candidates: Candidates,
+    /// Number of the search that found them.
+    search: u64,
     anchor: Option<Anchor>,
     /// Vertices outside their boxes, of the call that runs.
     outside: Vec<bool>,
@@ -25,6 +29,8 @@ pub struct CandidateSearch {
 pub struct Found<'a> {
     /// The pairs.
     pub candidates: &'a Candidates,
+    /// Number of the search that found them; 0 for others.
+    pub search: u64,
     /// Capacity only.
     pub buffers: &'a mut Buffers,
 }
@@ -35,28 +41,40 @@ pub struct Buffers {
     /// By vertex, factor times half thickness `[m]`.
     reach: Vec<f64>,
     screening: screening::Buffers,
+    vicinity: Vicinity,
     borders: Borders,
 }
 
 impl Found<'_> {
     /// The same candidates once more.
     pub fn again(&mut self) -> Found<'_> {
-        Found { candidates: self.candidates, buffers: self.buffers }
+        Found { candidates: self.candidates, search: self.search, buffers: self.buffers }
     }
 
     /// Numbers of those that may be nearer at `x` than `factor` times their thickness, ascending; and the buffers of what
     /// is next.
     pub(super) fn near(&mut self, model: &Model, x: &[Vec3], factor: f64, par: Par) -> (&[u32], &mut Borders) {
-        let Buffers { reach, screening, borders } = &mut *self.buffers;
+        let Buffers { reach, screening, vicinity, borders } = &mut *self.buffers;
+        let lists = Lists { primitives: &primitives(model), candidates: self.candidates };
+        if vicinity.list(model, self.search, &[x], factor).is_none() {
+            let farther = vicinity.next_reach(model, x, factor);
+            half_thicknesses(model, farther, reach);
+            vicinity.assign(model, self.search, x, farther, screening::near(x, lists, None, reach, screening, par));
+        }
+        if vicinity.reach() == factor {
+            return (vicinity.numbers(), borders);
+        }
         half_thicknesses(model, factor, reach);
-        (screening::near(x, &primitives(model), self.candidates, reach, screening, par), borders)
+        (screening::near(x, lists, Some(vicinity.numbers()), reach, screening, par), borders)
     }
 
     /// Numbers of those that may come closer than continuous detection allows on the way from `x0` to `x1`, ascending.
     pub(super) fn approaching(&mut self, model: &Model, x0: &[Vec3], x1: &[Vec3], par: Par) -> &[u32] {
-        let Buffers { reach, screening, .. } = &mut *self.buffers;
+        let Buffers { reach, screening, vicinity, .. } = &mut *self.buffers;
         half_thicknesses(model, 1.0, reach);
-        screening::approaching(x0, x1, &primitives(model), self.candidates, reach, screening, par)
+        let among = vicinity.list(model, self.search, &[x0, x1], SWEPT_REACH);
+        let lists = Lists { primitives: &primitives(model), candidates: self.candidates };
+        screening::approaching(x0, x1, lists, among, reach, screening, par)
     }
 }
 
@@ -107,7 +125,7 @@ impl CandidateSearch {
         par: Par,
     ) -> Found<'_> {
         self.find(model, filter, x0, x1, factor, par);
-        Found { candidates: &self.candidates, buffers: &mut self.buffers }
+        Found { candidates: &self.candidates, search: self.search, buffers: &mut self.buffers }
     }
 
     fn find(&mut self, model: &Model, filter: &BodyFilter, x0: &[Vec3], x1: &[Vec3], factor: f64, par: Par) {
@@ -119,6 +137,7 @@ impl CandidateSearch {
             if count == 0 {
                 return;
             }
+            self.search += 1;
             let pairs = self.candidates.vertex_face.len() + self.candidates.edge_edge.len();
             let grown = pairs > anchor.pairs + anchor.pairs / 4;
             let finite = (0..x0.len()).all(|v| !outside[v] || (is_finite(x0[v]) && is_finite(x1[v])));
@@ -141,6 +160,7 @@ impl CandidateSearch {
                 return;
             }
         }
+        self.search += 1;
         let radius = &mut self.buffers.reach;
         half_thicknesses(model, factor + 1.0, radius);
         let broad_phase = &mut meshes(&mut self.meshes, model).tree;
@@ -233,14 +253,12 @@ fn half_thicknesses(model: &Model, factor: f64, out: &mut Vec<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::random::Random;
 
     #[test]
     fn a_box_holds_what_swept_boxes_cover() {
-        let mut seed = 7u64;
-        let mut next = |n: u64| {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 33) % n
-        };
+        let mut random = Random(7);
+        let mut next = |n: u64| random.below(n);
         let (mut held, mut left) = (0, 0);
         for _ in 0..20_000 {
             // Few values, and their neighbours, so that bounds are often met exactly.

@@ -4,6 +4,7 @@
 //! * `pair`: primitive pairs of a model, which may touch, thickness, persistent keys
 //! * `contact`: the contact record with its gap
 //! * `candidates`: broad phase over a segment, kept while it holds, and at one state for the certificate
+//! * `vicinity`: the candidates that can count while no vertex goes far
 //! * `near`, `distinct`: contacts near the start, each once
 //! * `swept`: continuous detection over a segment
 //! * `passing`: tangled vertices, whose pairs pass
@@ -17,6 +18,7 @@ mod near;
 mod pair;
 mod passing;
 mod swept;
+mod vicinity;
 
 pub use candidates::{Buffers, CandidateSearch, Found, primitives};
 pub use contact::{Contact, half_space_contact, mesh_contact};

@@ -86,13 +86,13 @@ pub fn renewed_hits(
         let touched = |[a, b]: [u32; 2]| first[a as usize] || second[b as usize];
         par.filter_indexed(list.len(), |i| touched(list[i]).then_some(list[i]))
     };
-    let Found { candidates, buffers } = found;
+    let Found { candidates, buffers, .. } = found;
     let open = Candidates {
         vertex_face: pairs(&candidates.vertex_face, moved, &faces),
         edge_edge: pairs(&candidates.edge_edge, &edges, &edges),
         ..Candidates::default()
     };
-    let mut hits = swept_hits(model, filter, passing, Found { candidates: &open, buffers }, start, end, par);
+    let mut hits = swept_hits(model, filter, passing, Found { candidates: &open, search: 0, buffers }, start, end, par);
     // Half-spaces are all tested anew: that costs less than to sort them out.
     let on_mesh = |hit: &Hit| hit.pair.kind != PairKind::VertexHalfSpace;
     let half_spaces = hits.split_off(hits.partition_point(on_mesh));

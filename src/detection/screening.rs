@@ -47,28 +47,26 @@ const UNIT_ROUNDOFF: f32 = 0.5 * f32::EPSILON;
 const COARSE_SHARE: f64 = 0.01;
 
 /// Numbers of the candidates that may be nearer at `x` than the reaches of their primitives together, vertex-face pairs
-/// first, ascending. `reach` is by vertex index and the same for all vertices of a primitive `[m]`.
+/// first, ascending; of those `among` where that is given, ascending. `reach` is by vertex index and the same for all
+/// vertices of a primitive `[m]`.
 ///
 /// None that is nearer is left out, by exact distance or by that of [`crate::geometry`]. Cost: linear.
 pub fn near<'a>(
     x: &[Vec3],
-    primitives: &Primitives,
-    candidates: &Candidates,
+    lists: Lists,
+    among: Option<&[u32]>,
     reach: &[f64],
     buffers: &'a mut Buffers,
     par: Par,
 ) -> &'a [u32] {
-    let lists = Lists { primitives, candidates };
     let Buffers { coarse, open } = buffers;
-    open.take(lists);
-    if open.numbers.is_empty() {
-        return &open.numbers;
-    }
-    coarse.assign(x, None, reach, par);
-    open.rule_out::<COARSE_WIDTH, _>(lists, coarse, par);
-    let smallest = reach.iter().fold(f64::INFINITY, |a, b| a.min(*b));
-    if f64::from(COARSE_ERROR) > COARSE_SHARE * smallest * coarse.per_metre {
-        open.rule_out::<WIDTH, _>(lists, &Fine { x0: x, x1: None, reach }, par);
+    if open.take(lists, among) {
+        coarse.assign(x, None, reach, par);
+        open.rule_out::<COARSE_WIDTH, _>(lists, coarse, par);
+        let smallest = reach.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+        if f64::from(COARSE_ERROR) > COARSE_SHARE * smallest * coarse.per_metre {
+            open.rule_out::<WIDTH, _>(lists, &Fine { x0: x, x1: None, reach }, par);
+        }
     }
     &open.numbers
 }
@@ -78,21 +76,18 @@ pub fn near<'a>(
 pub fn approaching<'a>(
     x0: &[Vec3],
     x1: &[Vec3],
-    primitives: &Primitives,
-    candidates: &Candidates,
+    lists: Lists,
+    among: Option<&[u32]>,
     half_thickness: &[f64],
     buffers: &'a mut Buffers,
     par: Par,
 ) -> &'a [u32] {
-    let lists = Lists { primitives, candidates };
     let Buffers { coarse, open } = buffers;
-    open.take(lists);
-    if open.numbers.is_empty() {
-        return &open.numbers;
+    if open.take(lists, among) {
+        coarse.assign(x0, Some(x1), half_thickness, par);
+        open.rule_out::<COARSE_WIDTH, _>(lists, coarse, par);
+        open.rule_out::<WIDTH, _>(lists, &Fine { x0, x1: Some(x1), reach: half_thickness }, par);
     }
-    coarse.assign(x0, Some(x1), half_thickness, par);
-    open.rule_out::<COARSE_WIDTH, _>(lists, coarse, par);
-    open.rule_out::<WIDTH, _>(lists, &Fine { x0, x1: Some(x1), reach: half_thickness }, par);
     &open.numbers
 }
 
@@ -118,18 +113,25 @@ trait Screen<const L: usize>: Sync {
     fn margin(&self, shape: Shape, v: &[[usize; 4]; L]) -> [Self::Margin; L];
 }
 
-/// The candidates by number, vertex-face pairs first.
+/// Candidates by number, vertex-face pairs first.
 #[derive(Clone, Copy)]
-struct Lists<'a> {
-    primitives: &'a Primitives<'a>,
-    candidates: &'a Candidates,
+pub struct Lists<'a> {
+    /// What they are pairs of.
+    pub primitives: &'a Primitives<'a>,
+    /// The pairs.
+    pub candidates: &'a Candidates,
 }
 
 impl Open {
-    /// All candidates.
-    fn take(&mut self, lists: Lists) {
+    /// Begins with all candidates, or with some; whether there are any.
+    fn take(&mut self, lists: Lists, among: Option<&[u32]>) -> bool {
+        let Candidates { vertex_face, edge_edge, .. } = lists.candidates;
         self.numbers.clear();
-        self.numbers.extend(0..(lists.candidates.vertex_face.len() + lists.candidates.edge_edge.len()) as u32);
+        match among {
+            Some(among) => self.numbers.extend_from_slice(among),
+            None => self.numbers.extend(0..(vertex_face.len() + edge_edge.len()) as u32),
+        }
+        !self.numbers.is_empty()
     }
 
     /// Leaves those that the screen does not rule out.

@@ -1,6 +1,7 @@
 //! Closest points and bounding volumes.
 //!
 //! * `point_edge`, `point_triangle`, `edge_edge`: closest points and squared distances of primitive pairs
+//! * `wide_closest_points`: the same of several pairs side by side
 //! * `aabb`: axis-aligned boxes, rounded outward where a thickness is added
 //!
 //! # Accuracy
@@ -15,5 +16,6 @@ pub mod edge_edge;
 pub mod point_edge;
 pub mod point_triangle;
 mod scaling;
+pub mod wide_closest_points;
 
 pub use aabb::Aabb;

@@ -4,6 +4,7 @@
 //! gives the same bits. The only module that names rayon.
 
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Items per block of [`Par::for_each_block`] and [`Par::sum`]. Part of the numbers: changing it changes sums.
 pub const BLOCK: usize = 1024;
@@ -116,15 +117,30 @@ impl Par<'_> {
     /// Adds to `out` what `f(i)` gives for `i` in `0..count` where it gives something, in this order. Without a pool
     /// nothing else is gathered.
     pub fn extend_filtered<T: Send>(&self, out: &mut Vec<T>, count: usize, f: impl Fn(usize) -> Option<T> + Sync) {
+        self.extend_by_ranges(out, count, |range, out| out.extend(range.filter_map(&f)));
+    }
+
+    /// Lets `f` add what it finds in ranges that make up `0..count`, in this order. Without a pool nothing else is
+    /// gathered.
+    pub fn extend_by_ranges<T: Send>(
+        &self,
+        out: &mut Vec<T>,
+        count: usize,
+        f: impl Fn(Range<usize>, &mut Vec<T>) + Sync,
+    ) {
         match self.pool() {
             Some(pool) if count > BLOCK => {
                 let blocks = (0..count.div_ceil(BLOCK)).into_par_iter().with_max_len(1);
-                let found = blocks.map(|b| (b * BLOCK..count.min((b + 1) * BLOCK)).filter_map(&f).collect::<Vec<T>>());
+                let found = blocks.map(|b| {
+                    let mut list = Vec::new();
+                    f(b * BLOCK..count.min((b + 1) * BLOCK), &mut list);
+                    list
+                });
                 let mut lists: Vec<Vec<T>> = pool.install(|| found.collect());
                 out.reserve(lists.iter().map(Vec::len).sum());
                 lists.iter_mut().for_each(|list| out.append(list));
             }
-            _ => out.extend((0..count).filter_map(f)),
+            _ => f(0..count, out),
         }
     }
 

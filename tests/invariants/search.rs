@@ -279,3 +279,36 @@ fn widened_candidates_miss_nothing() {
     }
     assert!(hits_any > 100, "{hits_any}");
 }
+
+/// What is found while vertices go a little, so that short lists of candidates are kept, is what a search from nothing
+/// finds; and so when they go farther.
+#[test]
+fn short_lists_of_candidates_miss_nothing() {
+    let (mut near_any, mut hits_any) = (0, 0);
+    for seed in 1..5 {
+        let (world, _) = scene(seed);
+        let (model, filter) = (&world.model, BodyFilter::new(&world.model));
+        let mut jitter = Jitter(seed + 31);
+        let mut search = CandidateSearch::default();
+        let mut start = world.state.clone();
+        for round in 0..80 {
+            let mut end = start.clone();
+            // Half thicknesses are 0.004 and 0.003: a few steps or many until a list is used up.
+            let (way, swept) = ([1e-5, 4e-4, 1.5e-3, 0.01][round / 5 % 4], [1e-5, 4e-4, 3e-3, 8e-3][round % 4]);
+            end.positions.iter_mut().for_each(|x| *x = add(*x, jitter.vector(swept)));
+            let found = |search: &mut CandidateSearch| {
+                let passing = Passing::default();
+                let mut found = search.update(model, &filter, &start.positions, &end.positions, 2.0, Par::Serial);
+                let mut near = Vec::new();
+                near_contacts(model, &filter, &passing, found.again(), &start, &end, 2.0, &mut near, Par::Serial);
+                (swept_hits(model, &filter, &passing, found, &start, &end, Par::Serial), near)
+            };
+            let (kept, fresh) = (found(&mut search), found(&mut CandidateSearch::default()));
+            assert!(kept == fresh, "seed {seed} round {round}: {} {}", kept.0.len(), fresh.0.len());
+            hits_any += fresh.0.len();
+            near_any += fresh.1.len();
+            start.positions.iter_mut().for_each(|x| *x = add(*x, jitter.vector(way)));
+        }
+    }
+    assert!(hits_any > 100 && near_any > 10_000, "{hits_any} {near_any}");
+}

@@ -2,7 +2,7 @@
 
 use crate::random::Random;
 use crate::scenes::scenes;
-use signorini::detection::screening::{self, Buffers};
+use signorini::detection::screening::{self, Buffers, Lists};
 use signorini::detection::{Candidates, Motion, brute_force};
 use signorini::geometry::{edge_edge, point_triangle};
 use signorini::math::{Vec3, lerp};
@@ -49,12 +49,13 @@ fn no_near_or_approaching_pair_is_ruled_out_and_most_others_are() {
             candidates.vertex_face.truncate(4000);
             candidates.edge_edge.truncate(4000);
             let (x0, x1) = (&scene.x0, &scene.x1);
+            let lists = Lists { primitives: &p, candidates: &candidates };
             // The buffers of the scene before, and none.
             let [near, again] = [(Par::Serial, &mut buffers), (Par::Pool(&pool), &mut Buffers::default())]
-                .map(|(par, buffers)| screening::near(x0, &p, &candidates, &reach, buffers, par).to_vec());
+                .map(|(par, buffers)| screening::near(x0, lists, None, &reach, buffers, par).to_vec());
             assert_eq!(near, again);
             let [approaching, again] = [(Par::Serial, &mut buffers), (Par::Pool(&pool), &mut Buffers::default())]
-                .map(|(par, buffers)| screening::approaching(x0, x1, &p, &candidates, &reach, buffers, par).to_vec());
+                .map(|(par, buffers)| screening::approaching(x0, x1, lists, None, &reach, buffers, par).to_vec());
             assert_eq!(approaching, again);
             assert!(near.is_sorted() && approaching.is_sorted());
             for i in 0..candidates.vertex_face.len() + candidates.edge_edge.len() {
@@ -91,10 +92,11 @@ fn what_is_not_finite_stays_open() {
     let x: Vec<Vec3> =
         vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 9.0], [1.0, 0.0, 9.0], [0.0, 1.0, 9.0]];
     let candidates = Candidates { vertex_face: vec![[0, 1]], edge_edge: vec![[0, 1]], ..Candidates::default() };
+    let lists = Lists { primitives: &p, candidates: &candidates };
     let reach = [0.1; 6];
     let mut buffers = Buffers::default();
     let mut both =
-        |x1: &[Vec3]| screening::approaching(&x, x1, &p, &candidates, &reach, &mut buffers, Par::Serial).to_vec();
+        |x1: &[Vec3]| screening::approaching(&x, x1, lists, None, &reach, &mut buffers, Par::Serial).to_vec();
     assert!(both(&x).is_empty());
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for vertex in [0, 3, 4] {
@@ -103,8 +105,7 @@ fn what_is_not_finite_stays_open() {
                 end[vertex][k] = bad;
                 let expected = [0, 1];
                 assert_eq!(both(&end), expected, "{vertex} {k} {bad}");
-                let near =
-                    screening::near(&end, &p, &candidates, &reach, &mut Buffers::default(), Par::Serial).to_vec();
+                let near = screening::near(&end, lists, None, &reach, &mut Buffers::default(), Par::Serial).to_vec();
                 assert_eq!(near, expected);
             }
         }

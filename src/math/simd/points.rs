@@ -18,6 +18,12 @@ pub fn add<const L: usize, T: Number>(a: &Point<L, T>, b: &Point<L, T>) -> Point
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
+/// `a + s b`
+#[inline(always)]
+pub fn add_scaled<const L: usize, T: Number>(a: &Point<L, T>, s: Lanes<L, T>, b: &Point<L, T>) -> Point<L, T> {
+    [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
+}
+
 /// `s a`
 #[inline(always)]
 pub fn scale<const L: usize, T: Number>(s: Lanes<L, T>, a: &Point<L, T>) -> Point<L, T> {
